@@ -1,0 +1,96 @@
+"""Names of classes, and how two sets of names meet."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from stsem.errors import ClassTableError
+
+NO_LABEL = 255
+"""In truth: ignore this pixel. In an answer: no label, which counts as wrong."""
+
+MAX_CLASSES = 255
+
+Colour = tuple[int, int, int]
+Labels = npt.NDArray[np.uint8]
+
+
+def normalised(name: str) -> str:
+    """The form in which names are compared: case, `_`, `-` and space are all the same."""
+    return "".join(ch for ch in name.casefold() if ch not in "_- ")
+
+
+@dataclass(frozen=True)
+class ClassSet:
+    """Class names; the position of a name is the id used in every label image inside stsem.
+
+    Args:
+        names: unique after `normalised`, 1 to 255 of them.
+        colours: RGB for pictures, one per name; empty means the default palette.
+    """
+
+    names: tuple[str, ...]
+    colours: tuple[Colour, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.names) <= MAX_CLASSES:
+            raise ClassTableError(f"A class table needs 1 to {MAX_CLASSES} names, but {len(self.names)} came.")
+        seen: dict[str, str] = {}
+        for name in self.names:
+            if other := seen.get(normalised(name)):
+                raise ClassTableError(f"The class names {other!r} and {name!r} are the same name; rename one of them.")
+            seen[normalised(name)] = name
+        if self.colours and len(self.colours) != len(self.names):
+            raise ClassTableError(f"{len(self.names)} classes came with {len(self.colours)} colours; give one per class.")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def find(self, name: str) -> int | None:
+        """Id of `name`, compared by `normalised`; None when there is no such class."""
+        wanted = normalised(name)
+        return next((i for i, own in enumerate(self.names) if normalised(own) == wanted), None)
+
+    def palette(self) -> npt.NDArray[np.uint8]:
+        """(256, 3) RGB; row 255 is black. Own colours if given, else well separated hues."""
+        table = np.zeros((256, 3), np.uint8)
+        own = self.colours or tuple(_hue(i) for i in range(len(self.names)))
+        table[: len(own)] = np.array(own, np.uint8)
+        return table
+
+
+def translation(source: ClassSet, target: ClassSet, extra: Mapping[str, str] | None = None) -> Labels:
+    """Lookup table (256,) uint8 from ids of `source` to ids of `target`; NO_LABEL where no name meets.
+
+    Args:
+        source: whose ids come in, e.g. the network's classes.
+        target: whose ids go out, e.g. the log's classes.
+        extra: source name -> target name, for names that differ (`--class-map`).
+
+    Raises:
+        ClassTableError: `extra` names a class that the source or the target does not have.
+    """
+    table = np.full(256, NO_LABEL, np.uint8)
+    renamed = {_known(source, a): _known(target, b) for a, b in (extra or {}).items()}
+    for i, name in enumerate(source.names):
+        found = renamed.get(i, target.find(name))
+        if found is not None:
+            table[i] = found
+    return table
+
+
+def _known(classes: ClassSet, name: str) -> int:
+    found = classes.find(name)
+    if found is None:
+        raise ClassTableError(f"The class map names {name!r}, which is none of {', '.join(classes.names)}.")
+    return found
+
+
+def _hue(i: int) -> Colour:
+    """Golden-angle walk over hue with three levels of value."""
+    hue, value = (i * 0.61803398875) % 1.0 * 6.0, (230, 180, 130)[i // 5 % 3]
+    ramp = [max(0.0, min(1.0, abs((hue + shift) % 6.0 - 3.0) - 1.0)) for shift in (0.0, 4.0, 2.0)]
+    r, g, b = (int(value * (0.15 + 0.85 * x)) for x in ramp)
+    return r, g, b

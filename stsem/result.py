@@ -1,0 +1,75 @@
+"""What became of a frame: its outcome, and the spans of core time spent on it."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from stsem.classes import Labels
+
+
+class Outcome(StrEnum):
+    """How the ANSWER to a frame was made (DESIGN 5); every frame ends in exactly one."""
+
+    SEGMENTED = "segmented"
+    PROPAGATED = "propagated"
+    NO_SOURCE = "no_source"
+    DROPPED_BUSY = "dropped_busy"
+    UNDECODABLE = "undecodable"
+    INCOMPLETE = "incomplete"
+    PENDING = "pending"
+
+    @property
+    def is_answer(self) -> bool:
+        """Whether a frame with this outcome was answered with labels."""
+        return self in (Outcome.SEGMENTED, Outcome.PROPAGATED)
+
+
+@dataclass(frozen=True)
+class Span:
+    """One job on the simulated cores. Times are simulated nanoseconds, zero at the first frame's stamp.
+
+    Args:
+        frame: log index of the frame it worked for.
+        stage: `register`, `segment`, `propagate`, `track` or `fuse`.
+        cores: the cores it held, ascending.
+        ready_ns: when it could have started.
+        start_ns, end_ns: when it held its cores, half-open.
+    """
+
+    frame: int
+    stage: str
+    cores: tuple[int, ...]
+    ready_ns: int
+    start_ns: int
+    end_ns: int
+
+
+@dataclass(frozen=True, eq=False)
+class FrameResult:
+    """The record of one frame in one run.
+
+    Args:
+        index: log index.
+        stamp_ns: simulated capture stamp (offline: the log's stamp minus the first).
+        arrival_ns: simulated arrival; None offline, or if it never arrived.
+        taken_ns: when the answer path took it; None if it did not, or offline.
+        answered_ns: when its labels were finished; None if never, or offline.
+        outcome: exactly one.
+        keyframe: log index of the keyframe that its labels come from (its own index when segmented); None without.
+        reason: why it became a keyframe (`first`, `rotation`, `translation`, `time`, `interval`, `no homography`,
+            `every frame`, ...), or why it has no answer; "" otherwise.
+        coverage: share of pixels of `labels` that are not NO_LABEL; None without an answer.
+        spans: its jobs, in order of start.
+        labels: (H, W) uint8 in the log's classes; None without an answer.
+    """
+
+    index: int
+    stamp_ns: int
+    arrival_ns: int | None
+    taken_ns: int | None
+    answered_ns: int | None
+    outcome: Outcome
+    keyframe: int | None = None
+    reason: str = ""
+    coverage: float | None = None
+    spans: tuple[Span, ...] = field(default=())
+    labels: Labels | None = None
