@@ -1,0 +1,1 @@
+"""The report as data: its schema, its canonical bytes, its digest, and where two reports differ."""

@@ -1,0 +1,1 @@
+"""Verdicts over documents: rules, baselines, and what two reports must share to be compared."""
