@@ -1,0 +1,1 @@
+"""The labelled scene in world coordinates, and its files."""
