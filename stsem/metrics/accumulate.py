@@ -1,0 +1,127 @@
+"""What is kept of every judged frame: enough for any score, stratum, pairing or resampling later, and no pixels."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from stsem.metrics.confusion import Matrix
+from stsem.metrics.scores import ClassMask, Scores, Tally, mean_iou_over, pixel_accuracies, scores, tally
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Tallies of the judged frames of one run, by ascending log index.
+
+    Args:
+        index: (n,) int64 log indices.
+        stamp_ns: (n,) int64 capture stamps.
+        tallies: (n, 3, C) int64: pixels right, of truth, predicted, per class (see `scores.Tally`).
+    """
+
+    index: npt.NDArray[np.int64]
+    stamp_ns: npt.NDArray[np.int64]
+    tallies: Tally
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    @property
+    def pixel_accuracy(self) -> npt.NDArray[np.float64]:
+        """(n,) per frame; NaN for a frame whose truth is all "ignore"."""
+        return pixel_accuracies(self.tallies)
+
+    @property
+    def class_set(self) -> ClassMask:
+        """(C,) the classes with truth pixels in the full sample."""
+        return np.asarray(self.tallies[:, 1].sum(axis=0) > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The score of one judgement: offline, delivered, streaming, or a stratum of one.
+
+    Args:
+        scores: over the summed matrix.
+        matrix: (C, C + 1) int64, the sum itself.
+        frames: frames with truth that were judged.
+        misses: those of them without any answer; every pixel of them is wrong.
+        miou_common: mIoU over the classes that the network knows and the truth shows; NaN without such a class, None
+            if the network's classes were not stated.
+        classes_common: how many classes went into `miou_common`.
+    """
+
+    scores: Scores
+    matrix: Matrix
+    frames: int
+    misses: int
+    miou_common: float | None = None
+    classes_common: int | None = None
+
+
+class FrameTallies:
+    """Accumulates one judgement frame by frame.
+
+    Args:
+        classes: C.
+        known: (C,) classes that the network knows; None if not stated.
+    """
+
+    unit: ClassVar[str] = "fraction"
+    higher_is_better: ClassVar[bool] = True
+
+    def __init__(self, classes: int, known: ClassMask | None = None) -> None:
+        self._matrix = np.zeros((classes, classes + 1), np.int64)
+        self._known = known
+        self._stamps: dict[int, int] = {}
+        self._tallies: dict[int, npt.NDArray[np.int32]] = {}
+        self._misses = 0
+
+    def __len__(self) -> int:
+        return len(self._tallies)
+
+    def __contains__(self, index: int) -> bool:
+        return index in self._tallies
+
+    def update(self, index: int, stamp_ns: int, matrix: Matrix, *, missed: bool) -> None:
+        """Add the matrix (C, C + 1) of frame `index`; `missed`: it had no answer.
+
+        Raises:
+            ValueError: the frame was judged before.
+        """
+        if index in self._tallies:
+            raise ValueError(f"frame {index} was judged twice; every frame is judged once")
+        self._matrix += matrix
+        self._stamps[index] = stamp_ns
+        self._tallies[index] = tally(matrix).astype(np.int32)
+        self._misses += missed
+
+    def compute(self) -> Judged | None:
+        """The scores so far; None before the first frame."""
+        if not self._tallies:
+            return None
+        common = None if self._known is None else self._known & (self._matrix.sum(axis=1) > 0)
+        return Judged(
+            scores=scores(self._matrix),
+            matrix=self._matrix.copy(),
+            frames=len(self),
+            misses=self._misses,
+            miou_common=None if common is None else mean_iou_over(tally(self._matrix), common),
+            classes_common=None if common is None else int(common.sum()),
+        )
+
+    def samples(self) -> Samples:
+        """What bootstrap and pairing need."""
+        order = sorted(self._tallies)
+        empty = np.zeros((0, 3, len(self._matrix)), np.int64)
+        return Samples(
+            index=np.array(order, np.int64),
+            stamp_ns=np.array([self._stamps[i] for i in order], np.int64),
+            tallies=np.stack([self._tallies[i] for i in order]).astype(np.int64) if order else empty,
+        )
+
+    def pixel_accuracy(self) -> dict[int, float]:
+        """Pixel accuracy by log index; NaN for a frame whose truth is all "ignore"."""
+        samples = self.samples()
+        return dict(zip(samples.index.tolist(), samples.pixel_accuracy.tolist(), strict=True))

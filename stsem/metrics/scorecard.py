@@ -1,0 +1,186 @@
+"""The judge of one run: answers against their own frames, and against the frames that they were used for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from stsem.classes import ClassSet, Labels
+from stsem.metrics.accumulate import FrameTallies, Judged, Samples
+from stsem.metrics.by_distance import ByDistance, DistanceRow, DistanceSummary, summarise
+from stsem.metrics.confusion import Matrix, confusion
+from stsem.metrics.latency import Durations, Summary
+from stsem.metrics.scores import tally
+from stsem.result import Outcome
+
+STRATA = (Outcome.SEGMENTED, Outcome.PROPAGATED)
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """Everything that a scorecard found.
+
+    Args:
+        own: answers against their own frames: the `offline` or the `delivered` score; None: not measured.
+        streaming: at every truth frame's arrival, the newest finished answer against that frame; None: not measured.
+        age: of those newest answers, milliseconds: arrival of the truth frame - stamp of the answer used.
+        strata: `own` of the segmented and of the propagated frames; a stratum without frames is absent.
+        by_distance: by distance to the keyframe (reported for the offline pass only).
+        distance_summary: mean and minimum over the distances with enough frames; None without any.
+        unknown: names of classes with truth pixels that the network does not know; they count as wrong.
+        reason: why nothing was measured; "" when it was.
+    """
+
+    own: Judged | None
+    streaming: Judged | None
+    age: Summary | None
+    strata: Mapping[str, Judged]
+    by_distance: tuple[DistanceRow, ...]
+    distance_summary: DistanceSummary | None
+    unknown: tuple[str, ...]
+    reason: str
+
+    @property
+    def measured(self) -> bool:
+        """Whether there is any score."""
+        return not self.reason
+
+
+class Scorecard:
+    """Judges one run (mode x clock).
+
+    Args:
+        classes: of the log; label ids of truth and answers are positions in it.
+        known: (C,) bool, which of them the network knows; None: all of them, or not stated.
+
+    Raises:
+        ValueError: `known` has another length than `classes`.
+    """
+
+    unit: ClassVar[str] = "fraction"
+    higher_is_better: ClassVar[bool] = True
+
+    def __init__(self, classes: ClassSet, known: npt.NDArray[np.bool_] | None = None) -> None:
+        if known is not None and known.shape != (len(classes),):
+            raise ValueError(f"`known` of shape {known.shape} does not fit {len(classes)} classes")
+        self._classes, self._known = classes, known
+        self._own, self._streaming = self._tallies(), self._tallies()
+        self._strata = {outcome: self._tallies() for outcome in STRATA}
+        self._distances = ByDistance(len(classes))
+        self._ages = Durations()
+
+    def judge(
+        self,
+        index: int,
+        stamp_ns: int,
+        truth: Labels,
+        answer: Labels | None,
+        *,
+        outcome: Outcome,
+        distance: int | None,
+        distance_ns: int | None,
+    ) -> None:
+        """Judge an answer against its own frame (offline, or as delivered): once for EVERY frame with truth.
+
+        Args:
+            index: log index.
+            stamp_ns: capture stamp.
+            truth: (H, W) uint8, NO_LABEL is ignored.
+            answer: (h, w) uint8; None when the frame got no answer: every pixel is wrong.
+            outcome: how the answer was made, or why there is none.
+            distance, distance_ns: to the keyframe that the answer comes from, in log indices and stamps; or None.
+
+        Raises:
+            ValueError: the frame was judged before, or an image is not a label image.
+        """
+        matrix = confusion(truth, answer, len(self._classes))
+        self._own.update(index, stamp_ns, matrix, missed=answer is None)
+        if outcome in self._strata:
+            self._strata[outcome].update(index, stamp_ns, matrix, missed=answer is None)
+        if answer is not None and distance is not None and distance_ns is not None:
+            self._distances.update(distance, distance_ns, matrix)
+
+    def judge_streaming(self, index: int, truth: Labels, answer: Labels | None, *, age_ns: int | None) -> None:
+        """Judge, at the arrival of frame `index`, the finished answer with the newest stamp against THIS frame's truth.
+
+        To be called once for EVERY frame with truth: undecodable and incomplete ones too, at their log time.
+
+        Args:
+            index: log index of the frame whose truth it is.
+            truth: (H, W) uint8, NO_LABEL is ignored.
+            answer: (h, w) uint8; None before the first answer: a miss, every pixel is wrong.
+            age_ns: this instant - stamp of the answer, on the simulated clock; None with a miss.
+
+        Raises:
+            ValueError: the frame was judged so before, or an image is not a label image.
+        """
+        matrix: Matrix = confusion(truth, answer, len(self._classes))
+        self._streaming.update(index, 0, matrix, missed=answer is None)
+        if age_ns is not None:
+            self._ages.update(age_ns)
+
+    def compute(self) -> Accuracy:
+        """All scores of the run."""
+        own, streaming = self._own.compute(), self._streaming.compute()
+        reason = self._why_nothing(own or streaming)
+        if reason:
+            return Accuracy(None, None, None, {}, (), None, self._unknown(own or streaming), reason)
+        rows = self._distances.compute()
+        strata = {str(outcome): found for outcome, kept in self._strata.items() if (found := kept.compute())}
+        return Accuracy(
+            own=own,
+            streaming=streaming,
+            age=self._ages.compute(),
+            strata=strata,
+            by_distance=rows,
+            distance_summary=summarise(rows),
+            unknown=self._unknown(own or streaming),
+            reason="",
+        )
+
+    def samples(self) -> Samples:
+        """Per-frame tallies of the answers against their own frames, for intervals and pairing."""
+        return self._own.samples()
+
+    def streaming_samples(self) -> Samples:
+        """Per-frame tallies of the streaming judgement; stamps are those given to `judge` for the same frames.
+
+        Raises:
+            ValueError: a frame was judged streaming, but never against itself.
+        """
+        found, own = self._streaming.samples(), self._own.samples()
+        stamps = dict(zip(own.index.tolist(), own.stamp_ns.tolist(), strict=True))
+        missing = [i for i in found.index.tolist() if i not in stamps]
+        if missing:
+            raise ValueError(f"frame {missing[0]} was judged streaming only; judge every frame with truth both ways")
+        stamp_ns = np.array([stamps[i] for i in found.index.tolist()], np.int64)
+        return Samples(found.index, stamp_ns, found.tallies)
+
+    def pixel_accuracy(self) -> dict[int, float]:
+        """Pixel accuracy of answers against their own frames by log index (frames.csv); NaN: truth is all "ignore"."""
+        return self._own.pixel_accuracy()
+
+    def streaming_pixel_accuracy(self) -> dict[int, float]:
+        """The same for the streaming judgement."""
+        return self._streaming.pixel_accuracy()
+
+    def _tallies(self) -> FrameTallies:
+        return FrameTallies(len(self._classes), self._known)
+
+    def _why_nothing(self, judged: Judged | None) -> str:
+        if judged is None:
+            return "no frame with truth was judged"
+        if not judged.scores.pixels:
+            return "the truth labels no pixel with a class of the log"
+        if judged.classes_common == 0:
+            return "the network and the truth have no class in common"
+        return ""
+
+    def _unknown(self, judged: Judged | None) -> tuple[str, ...]:
+        if judged is None or self._known is None:
+            return ()
+        shown = tally(judged.matrix)[1] > 0
+        return tuple(name for name, seen, knows in zip(self._classes.names, shown, self._known, strict=True)
+                     if seen and not knows)  # fmt: skip
