@@ -7,6 +7,7 @@
     |   `-- DecodeError        1   one message cannot be decoded (survivable: the frame is `undecodable`)
     |-- ClassTableError        1   the class names of a log, a file or a network
     |-- NetworkError           1   an ONNX file, its sidecar, or what it returns
+    |-- TrainingError          1   training pairs or a checkpoint
     |-- CostError              1   a cost profile
     |-- OutputError            1   a folder or file that cannot be written
     |-- MissingExtraError      1   an optional dependency that is not installed
@@ -67,6 +68,10 @@ class ClassTableError(StsemError):
 
 class NetworkError(StsemError):
     """An ONNX file, its sidecar, or what it returns, is not what DESIGN 11 accepts."""
+
+
+class TrainingError(StsemError):
+    """Training pairs or a checkpoint that cannot be used."""
 
 
 class CostError(StsemError):

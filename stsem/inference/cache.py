@@ -1,0 +1,166 @@
+"""Network outputs kept on disk: the same frame through the same network costs nothing the second time.
+
+Layout: `<root>/outputs/<key>/<stamp_ns>.seg`, one file per frame, beside an `about.json` that says what the key stands
+for. An entry is a header, the zlib-packed labels and confidence, and their checksum. It also holds a checksum of the
+pixels that went in, so that two cameras of one log under one stamp are never confused. Entries that do not fit are
+ignored and written anew.
+"""
+
+import hashlib
+import json
+import os
+import shutil
+import struct
+import zlib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+
+from stsem.errors import OutputError
+from stsem.frame import Frame, Image, Segmentation
+from stsem.inference.inferencer import CONFIDENCE_STEPS, Identity, Inferencer, Output, segmentation
+
+_MAGIC = b"stsem-o1"
+_HEADER = struct.Struct("<8sHHIII")  # magic, width, height, checksum of the input, of the payload, payload size
+_LEVEL = 1
+
+
+def cache_root() -> Path:
+    """Folder of every cache of stsem: `STSEM_CACHE`, else the platform's user cache folder. It may not exist yet."""
+    chosen = os.environ.get("STSEM_CACHE")
+    return Path(chosen) if chosen else platformdirs.user_cache_path("stsem")
+
+
+class OutputCache:
+    """The outputs of one network, run in one way, on one log.
+
+    Args:
+        root: see `cache_root`.
+        log_sha256: of the log's bytes.
+        identity: network, backend, versions, precision and CPU features.
+
+    Raises:
+        OutputError: the folder cannot be made.
+    """
+
+    def __init__(self, root: Path, log_sha256: str, identity: Identity) -> None:
+        about = json.dumps({"log_sha256": log_sha256, "confidence_steps": CONFIDENCE_STEPS, **asdict(identity)},
+                           indent=1, sort_keys=True)  # fmt: skip
+        self.folder = root / "outputs" / hashlib.sha256(about.encode()).hexdigest()[:32]
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as err:
+            raise _unwritable(self.folder, err) from err
+        _write_atomically(self.folder / "about.json", about.encode())
+
+    def get(self, stamp_ns: int, source: int) -> Output | None:
+        """The entry of a stamp; None when there is none, when it is damaged, or when other pixels made it.
+
+        Args:
+            stamp_ns: capture stamp.
+            source: `checksum` of the pixels.
+        """
+        try:
+            return unpack((self.folder / f"{stamp_ns}.seg").read_bytes(), source)
+        except OSError:
+            return None
+
+    def put(self, stamp_ns: int, source: int, output: Output) -> None:
+        """Write or replace an entry. Raises OutputError when the folder cannot be written."""
+        _write_atomically(self.folder / f"{stamp_ns}.seg", pack(output, source))
+
+
+class CachedInferencer:
+    """An `Inferencer` that reads back what it wrote, on a cold run too."""
+
+    def __init__(self, inferencer: Inferencer, cache: OutputCache) -> None:
+        self._inferencer, self._cache = inferencer, cache
+        self.network, self.identity = inferencer.network, inferencer.identity
+
+    def infer(self, frame: Frame) -> Segmentation:
+        """See `Inferencer.infer`."""
+        source = checksum(frame.image, frame.previous)
+        output = self._cache.get(frame.stamp_ns, source)
+        if output is None:
+            computed = self._inferencer.compute(frame.image, frame.previous)
+            self._cache.put(frame.stamp_ns, source, computed)
+            output = self._cache.get(frame.stamp_ns, source) or computed
+        return segmentation(output, frame.size)
+
+
+def checksum(image: Image, previous: Image | None) -> int:
+    """CRC-32 of the pixels of a frame and its predecessor."""
+    crc = zlib.crc32(np.ascontiguousarray(image).data, image.shape[1])
+    return crc if previous is None else zlib.crc32(np.ascontiguousarray(previous).data, crc)
+
+
+def pack(output: Output, source: int) -> bytes:
+    """Bytes of an entry."""
+    height, width = output.labels.shape
+    payload = zlib.compress(output.labels.tobytes() + output.confidence.tobytes(), _LEVEL)
+    return _HEADER.pack(_MAGIC, width, height, source, zlib.crc32(payload), len(payload)) + payload
+
+
+def unpack(entry: bytes, source: int) -> Output | None:
+    """Output from the bytes of `pack`; None when they are damaged or made from other pixels."""
+    if len(entry) < _HEADER.size:
+        return None
+    magic, width, height, made_from, crc, length = _HEADER.unpack_from(entry)
+    payload = entry[_HEADER.size :]
+    if (magic, made_from, length) != (_MAGIC, source, len(payload)) or zlib.crc32(payload) != crc:
+        return None
+    planes = np.frombuffer(zlib.decompress(payload), np.uint8)
+    if planes.size != 2 * width * height:
+        return None
+    labels, confidence = planes.reshape(2, height, width)
+    return Output(labels, confidence)
+
+
+@dataclass(frozen=True)
+class CacheUsage:
+    """What the cache holds: files of any kind (network outputs, cost profiles), and their bytes."""
+
+    root: Path
+    files: int
+    bytes: int
+
+
+def usage(root: Path) -> CacheUsage:
+    """Count the files below `root`; a folder that does not exist holds nothing."""
+    sizes = [path.stat().st_size for path in root.rglob("*") if path.is_file()]
+    return CacheUsage(root, len(sizes), sum(sizes))
+
+
+def clear(root: Path) -> CacheUsage:
+    """Remove the cached network outputs below `root`; returns what was removed. Cost profiles stay.
+
+    Raises:
+        OutputError: something there cannot be removed.
+    """
+    outputs = root / "outputs"
+    removed = usage(outputs)
+    try:
+        if outputs.is_dir():
+            shutil.rmtree(outputs)
+    except OSError as err:
+        raise _unwritable(outputs, err) from err
+    return removed
+
+
+def _write_atomically(path: Path, data: bytes) -> None:
+    """Beside, then renamed: a reader, or a run that was killed, never sees half a file."""
+    aside = path.with_suffix(f".{os.getpid()}.part")
+    try:
+        aside.write_bytes(data)
+        aside.replace(path)
+    except OSError as err:
+        aside.unlink(missing_ok=True)
+        raise _unwritable(path.parent, err) from err
+
+
+def _unwritable(folder: Path, err: OSError) -> OutputError:
+    return OutputError(
+        f"The cache folder {folder} cannot be written ({err.strerror}); set STSEM_CACHE to another, or use --no-cache."
+    )

@@ -1,0 +1,1 @@
+"""Training a network from scratch. Needs the extra `train`."""

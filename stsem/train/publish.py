@@ -1,0 +1,64 @@
+"""A checkpoint -> the two files that a user runs: ONNX and sidecar, checked against torch."""
+
+from pathlib import Path
+
+import torch
+
+from stsem import chance
+from stsem.errors import NetworkError, OutputError
+from stsem.inference.network import CLASS_COUNT, Network, load_network
+from stsem.inference.preprocess import network_inputs
+from stsem.inference.sidecar import Sidecar, render
+from stsem.models.export import AGREEMENT, agreement, export_onnx
+from stsem.models.two_stream import OneStream, TwoStream
+from stsem.models.zoo import build
+from stsem.train.loop import averaged_weights, read_checkpoint
+
+
+def load_checkpoint(path: Path, classes: int) -> TwoStream | OneStream:
+    """The network of a checkpoint with its averaged weights, in evaluation mode.
+
+    Raises:
+        TrainingError: the checkpoint cannot be read.
+        NetworkError: it is of another number of classes.
+    """
+    state = read_checkpoint(path)
+    network = build(state["architecture"], classes)
+    try:
+        network.load_state_dict(averaged_weights(state))
+    except RuntimeError as err:
+        raise NetworkError(f"The weights in {path} do not fit {state['architecture']} with {classes} classes.") from err
+    return network.eval()
+
+
+def publish(network: TwoStream | OneStream, sidecar: Sidecar, path: Path) -> Network:
+    """Write `path` (.onnx) and its sidecar (.toml) for inputs of `sidecar.size`, and check them.
+
+    Returns:
+        The network as a user would load it.
+
+    Raises:
+        NetworkError: the size does not fit, or the exported graph disagrees with torch.
+        OutputError: a file cannot be written.
+    """
+    export_onnx(network, path, size=sidecar.size, metadata={CLASS_COUNT: str(len(sidecar.classes))})
+    try:
+        path.with_suffix(".toml").write_text(render(sidecar), encoding="utf-8")
+    except OSError as err:
+        raise OutputError(f"The sidecar of {path} cannot be written: {err.strerror}.") from err
+    published = load_network(path)
+    share = _agreement_on_noise(network, published)
+    if share < AGREEMENT:
+        raise NetworkError(f"The exported network {path} gives only {share:.4%} of the labels that torch gives, "
+                           f"{AGREEMENT:.2%} are needed; do not use it.")  # fmt: skip
+    return published
+
+
+def _agreement_on_noise(network: TwoStream | OneStream, published: Network) -> float:
+    """On a smooth random image and a shifted copy, so that classes change across it."""
+    width, height = published.size
+    coarse = torch.from_numpy(chance.generator(0, "agreement").random((1, 3, 12, 20)))
+    full = torch.nn.functional.interpolate(coarse, size=(height, width + 8), mode="bicubic")[0]
+    image = (full.clamp(0, 1) * 255).byte().permute(1, 2, 0).numpy()
+    inputs = network_inputs(image[:, 8:].copy(), image[:, :-8].copy(), published.sidecar)
+    return agreement(network, published.path, inputs)
