@@ -13,7 +13,9 @@ from stsem.document.part import plain
 from stsem.document.schema import SCHEMA_VERSION, Document
 from stsem.errors import OutputError, UsageError
 
-_OUTSIDE_DIGEST = ("host", "digest")
+OUTSIDE_DIGEST = ("host", "digest")
+"""Top-level keys that the digest leaves out."""
+_RESULTS = ("schema_version", "state", "accuracy_state", "input", "runs", "comparison", "more_comparisons")
 
 
 def canonical(value: Any) -> bytes:
@@ -44,7 +46,16 @@ def as_json(document: Document) -> dict[str, JsonValue]:
 
 def digest(document: Document) -> str:
     """sha256 (hex) of the canonical JSON without `host` and `digest`."""
-    kept = {key: value for key, value in as_json(document).items() if key not in _OUTSIDE_DIGEST}
+    kept = {key: value for key, value in as_json(document).items() if key not in OUTSIDE_DIGEST}
+    return hashlib.sha256(canonical(kept)).hexdigest()
+
+
+def results_digest(document: Document) -> str:
+    """sha256 (hex) of what was measured alone: input, runs, comparisons, states; no versions, no configuration.
+
+    A gate asks for equal results across installations, where `digest` differs by the version of any package.
+    """
+    kept = {key: value for key, value in as_json(document).items() if key in _RESULTS}
     return hashlib.sha256(canonical(kept)).hexdigest()
 
 

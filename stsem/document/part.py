@@ -8,7 +8,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 
 def plain(value: Any) -> Any:
-    """`value` with numpy scalars and arrays turned into Python ones, at any depth, and other types left alone."""
+    """`value` with numpy scalars and arrays turned into Python ones, tuples into lists, at any depth."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):
@@ -16,7 +16,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return tuple(plain(item) for item in value)
+        return [plain(item) for item in value]
     return value
 
 

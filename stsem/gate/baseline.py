@@ -1,0 +1,133 @@
+"""The baseline: a small reviewed file that holds what is gated, and what must agree for a comparison to make sense."""
+
+import json
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, ValidationError
+
+from stsem.document.canonical import canonical, document_from, results_digest
+from stsem.document.origin import Identity
+from stsem.document.part import Count, Number, Part
+from stsem.document.schema import Document, Run, State
+from stsem.document.timing import Outcomes
+from stsem.errors import NothingMeasuredError, UsageError
+
+ORACLE = "oracle"
+
+GATED = (
+    "offline.miou", "offline.pixel_accuracy", "delivered.miou", "delivered.pixel_accuracy", "streaming.miou",
+    "streaming.pixel_accuracy", "latency_ms.from_arrival.p50", "latency_ms.from_arrival.p95",
+    "latency_ms.from_arrival.max", "throughput.output_hz", "throughput.processed_share", "coverage.scored",
+)  # fmt: skip
+"""Paths inside a run that a baseline keeps."""
+
+
+class BaselineRun(Part):
+    """What is kept of one run."""
+
+    mode: str
+    """Mode of the run."""
+    clock: str
+    """Clock of the run."""
+    outcomes: Outcomes
+    """How many frames ended how."""
+    keyframes: tuple[Count, ...] = ()
+    """Log indices of the frames that went through the network."""
+    metrics: dict[str, Number]
+    """Path inside the run -> value in the unit of report.json; null when it was not measured."""
+
+
+class Baseline(Part):
+    """What a report is gated against."""
+
+    baseline_version: Literal[1] = 1
+    """Version of this file's layout."""
+    schema_version: int
+    """Schema version of the report it was made from."""
+    state: State
+    """State of the report it was made from."""
+    digest: str
+    """Digest of the report it was made from."""
+    results_digest: str
+    """Digest of what was measured alone, comparable across installations."""
+    logs: dict[str, str]
+    """Name of a log -> sha256."""
+    classes: tuple[str, ...]
+    """Classes of the log."""
+    identity: Identity
+    """Network, backend, versions and costs."""
+    runs: tuple[BaselineRun, ...] = Field(min_length=1)
+    """One per mode."""
+
+    @property
+    def is_oracle(self) -> bool:
+        """Whether the truth stood in for the network: then results must be equal, not merely close."""
+        return self.identity.model == ORACLE or self.identity.backend == ORACLE
+
+
+def make_baseline(document: Document) -> Baseline:
+    """The baseline that a report would be.
+
+    Raises:
+        NothingMeasuredError: the report measured nothing, so it cannot judge another.
+    """
+    if document.state == "invalid" or not document.runs:
+        raise NothingMeasuredError("The report measured nothing, so it cannot be a baseline; make it from a valid run.")
+    return Baseline(
+        schema_version=document.schema_version,
+        state=document.state,
+        digest=document.digest,
+        results_digest=results_digest(document),
+        logs={log.name: log.sha256 for log in document.input.logs},
+        classes=document.input.classes,
+        identity=document.identity,
+        runs=tuple(_kept(run) for run in document.runs),
+    )
+
+
+def _kept(run: Run) -> BaselineRun:
+    return BaselineRun(
+        mode=run.mode,
+        clock=run.clock,
+        outcomes=run.outcomes,
+        keyframes=run.keyframes,
+        metrics={path: _number(run, path) for path in GATED},
+    )
+
+
+def _number(run: Run, path: str) -> float | None:
+    found: object = run
+    for key in path.split("."):
+        found = getattr(found, key) if isinstance(found, Part) else None
+    return float(found) if isinstance(found, int | float) else None
+
+
+def baseline_bytes(baseline: Baseline) -> bytes:
+    """The file, canonical: one report, one baseline, small differences in review."""
+    return canonical(baseline.model_dump(mode="json"))
+
+
+def read_baseline(path: Path) -> Baseline:
+    """Read a baseline, or make one from a report.json.
+
+    Raises:
+        NothingMeasuredError: there is no such file, so there is nothing to compare with.
+        UsageError: the file is neither a baseline nor a report of this version.
+    """
+    try:
+        values = json.loads(path.read_bytes())
+    except OSError as err:
+        raise NothingMeasuredError(
+            f"There is no baseline {path} ({err.strerror}); make one from a good report with --write-baseline."
+        ) from err
+    except ValueError as err:
+        raise UsageError(f"{path} is not a baseline: it is no JSON; make one from a report.") from err
+    if not isinstance(values, dict) or "baseline_version" not in values:
+        return make_baseline(document_from(values, str(path)))
+    try:
+        return Baseline.model_validate(values)
+    except ValidationError as err:
+        first = err.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise UsageError(f"{path} is not a baseline of this version: {where}: {first['msg']}; make it again.") from err

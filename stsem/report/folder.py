@@ -1,0 +1,93 @@
+"""The folder of a run: written aside, renamed when complete."""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from stsem.document.canonical import to_bytes
+from stsem.document.schema import Document
+from stsem.errors import OutputError
+from stsem.report.frames_csv import frames_csv
+from stsem.report.inputs import ReportInputs
+
+
+def folder_name(document: Document) -> str:
+    """`<config hash>-<digest prefix>`: the same run lands in the same folder."""
+    return f"{document.config_hash[:8]}-{document.digest[:8]}"
+
+
+def write_folder(inputs: ReportInputs, folder: Path) -> Path:
+    """Write every file of the report to `folder`, which appears at once when all are complete.
+
+    A folder that holds an earlier report is replaced; any other folder that is not empty is left alone.
+
+    Returns:
+        `folder`.
+
+    Raises:
+        OutputError: the folder cannot be written, or holds something that is no report.
+    """
+    check_target(folder)
+    with _aside(folder) as aside:
+        for name, make in _FILES.items():
+            if (data := make(inputs)) is not None:
+                (aside / name).write_bytes(data)
+        if inputs.point_cloud is not None:
+            shutil.copyfile(inputs.point_cloud, aside / "map.ply")
+    return folder
+
+
+_FILES: dict[str, Callable[[ReportInputs], bytes | None]] = {
+    "report.json": lambda inputs: to_bytes(inputs.document),
+    "frames.csv": frames_csv,
+    "trace.json": lambda inputs: inputs.trace,
+    "trajectory.txt": lambda inputs: inputs.trajectory,
+}
+
+
+def check_target(folder: Path) -> None:
+    """Whether a report may be written to `folder`: worth asking before a long run.
+
+    Raises:
+        OutputError: it is a file, holds something that is no report, or its parent cannot be written.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"The output {folder} is a file, a folder was expected; choose another place with --out.")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / "report.json").is_file():
+        raise OutputError(f"The folder {folder} holds files that are no report; choose another place with --out.")
+    with _aside(folder) as aside:
+        aside.rmdir()
+
+
+@contextmanager
+def _aside(folder: Path) -> Iterator[Path]:
+    """A new folder beside `folder` that takes its place at the end, or vanishes when anything goes wrong."""
+    target = folder.absolute()
+    aside = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(aside, ignore_errors=True)
+        aside.mkdir()
+        yield aside
+        if aside.is_dir():
+            _swap(aside, target)
+    except OSError as err:
+        raise OutputError(
+            f"The report folder {folder} cannot be written ({err.strerror or err}); choose --out."
+        ) from err
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _swap(aside: Path, target: Path) -> None:
+    old = aside.with_name(f"{aside.name}.old")
+    if target.exists():
+        target.replace(old)
+    try:
+        aside.replace(target)
+    finally:
+        if not target.exists():
+            old.replace(target)
+        shutil.rmtree(old, ignore_errors=True)

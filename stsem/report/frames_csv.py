@@ -1,0 +1,70 @@
+"""frames.csv: a row per frame and mode, times as exact integers."""
+
+from typing import Any
+
+import pandas as pd
+
+from stsem.report.inputs import FrameRow, ReportInputs
+
+STAGES = ("register", "select", "segment", "propagate", "track", "fuse")
+"""Pipeline order: the order of stage columns, and of stages in every table and picture."""
+
+_INTEGERS = (
+    "frame", "log_stamp_ns", "stamp_ns", "arrival_ns", "taken_ns", "answered_ns", "keyframe", "distance_frames",
+    "distance_ns", "latency_from_arrival_ns", "latency_from_stamp_ns", "waiting_ns", "offline_keyframe",
+)  # fmt: skip
+
+
+def frame_table(inputs: ReportInputs) -> pd.DataFrame:
+    """One row per frame and mode; integers are nullable Int64, so that an absent time stays exact and blank."""
+    stages = stages_of(inputs.frames)
+    records = []
+    for run in inputs.document.runs:
+        rows = inputs.rows(run.mode)
+        stamps = {row.result.index: row.log_stamp_ns for row in rows}
+        records += [_record(row, stamps, run.stages_inside, stages) for row in rows]
+    table = pd.DataFrame.from_records(records, columns=list(_record_columns(stages)))
+    whole = [*_INTEGERS, *(f"{stage}_{kind}_ns" for stage in stages for kind in ("waiting", "service"))]
+    return table.astype(dict.fromkeys(whole, "Int64"))
+
+
+def frames_csv(inputs: ReportInputs) -> bytes:
+    """The bytes of frames.csv; floats in the shortest form that reads back equal."""
+    text: str = frame_table(inputs).to_csv(index=False, lineterminator="\n")
+    return text.encode()
+
+
+def stages_of(rows: tuple[FrameRow, ...]) -> tuple[str, ...]:
+    """The stages that worked, in pipeline order; unknown ones behind, by name."""
+    found = {span.stage for row in rows for span in row.result.spans}
+    return (*(stage for stage in STAGES if stage in found), *sorted(found.difference(STAGES)))
+
+
+def _record(row: FrameRow, stamps: dict[int, int], inside: tuple[str, ...], stages: tuple[str, ...]) -> dict[str, Any]:
+    result, latency = row.result, row.latency_ns
+    source = result.keyframe
+    record = {
+        "mode": row.mode, "frame": result.index, "outcome": str(result.outcome), "reason": result.reason,
+        "keyframe": source, "distance_frames": None if source is None else result.index - source,
+        "distance_ns": None if source is None else row.log_stamp_ns - stamps[source],
+        "log_stamp_ns": row.log_stamp_ns, "stamp_ns": result.stamp_ns, "arrival_ns": result.arrival_ns,
+        "taken_ns": result.taken_ns, "answered_ns": result.answered_ns, "latency_from_arrival_ns": latency,
+        "latency_from_stamp_ns": None if result.answered_ns is None else result.answered_ns - result.stamp_ns,
+        "waiting_ns": None if latency is None else latency - sum(row.service_ns(stage) or 0 for stage in inside),
+        "labelled_share": result.coverage, "offline_keyframe": row.offline_keyframe,
+        "offline_pixel_accuracy": row.offline, "delivered_pixel_accuracy": row.delivered,
+        "streaming_pixel_accuracy": row.streaming,
+    }  # fmt: skip
+    for stage in stages:
+        record[f"{stage}_waiting_ns"] = row.waiting_ns(stage)
+        record[f"{stage}_service_ns"] = row.service_ns(stage)
+    return record
+
+
+def _record_columns(stages: tuple[str, ...]) -> tuple[str, ...]:
+    return (
+        "mode", "frame", "outcome", "reason", "keyframe", "distance_frames", "distance_ns", "log_stamp_ns", "stamp_ns",
+        "arrival_ns", "taken_ns", "answered_ns", "latency_from_arrival_ns", "latency_from_stamp_ns", "waiting_ns",
+        "labelled_share", "offline_keyframe", "offline_pixel_accuracy", "delivered_pixel_accuracy",
+        "streaming_pixel_accuracy", *(f"{stage}_{kind}_ns" for stage in stages for kind in ("waiting", "service")),
+    )  # fmt: skip

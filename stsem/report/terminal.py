@@ -1,0 +1,89 @@
+"""What the command prints at its end: a short table, or a summary for machines."""
+
+from collections.abc import Callable
+
+from pydantic import JsonValue
+from tabulate import tabulate
+
+from stsem.document.schema import Document, Run
+from stsem.report.metrics import METRICS, row_delta, shown
+
+_PATHS = ("offline.miou", "streaming.miou", "offline.pixel_accuracy", "latency_ms.from_arrival.p50",
+          "latency_ms.from_arrival.p95", "throughput.output_hz")  # fmt: skip
+
+_SCORE_KEYS = {"miou", "pixel_accuracy", "classes_averaged", "n"}
+
+
+def closing_table(document: Document) -> str:
+    """One column per mode as plain text, then the paired difference, and the basis of the numbers below."""
+    headers = ["", *(run.mode for run in document.runs)]
+    rows = [[METRICS[path].name, *(shown(run, path) for run in document.runs)] for path in _PATHS]
+    rows += [[name, *(str(get(run)) for run in document.runs)] for name, get in _COUNTS.items()]
+    if document.comparison:
+        headers.append("difference [95 % interval]")
+        deltas = {row.metric: row_delta(row) for row in document.comparison.rows}
+        for path, row in zip(_PATHS, rows, strict=False):
+            row.append(deltas.get(path, ""))
+    align = ("left", *("right" for _ in headers[1:]))
+    table = tabulate(rows, headers, tablefmt="simple", disable_numparse=True, colalign=align)
+    return f"{table}\n\n{basis(document)}"
+
+
+def basis(document: Document) -> str:
+    """Coverage, classes averaged and the meaning of latency, in one or two sentences."""
+    if document.accuracy_state != "measured" or not document.runs:
+        accuracy = f"Accuracy was not measured: {document.accuracy_reason or 'nothing ran'}."
+    else:
+        cover = document.runs[0].coverage
+        score = next((s for r in document.runs for s in (r.offline, r.delivered, r.streaming) if s), None)
+        classes = f", {score.classes_averaged} classes averaged" if score else ""
+        accuracy = (
+            f"Accuracy over {cover.scored} of {cover.frames} frames ({cover.frames_with_truth} with truth){classes}."
+        )
+    if all(run.latency_ms is None for run in document.runs):
+        return f"{accuracy} Offline: no clock, so no latency."
+    return f"{accuracy} Latency from arrival, on the simulated clock."
+
+
+def summary(document: Document) -> dict[str, JsonValue]:
+    """What `--json` prints: state, digest and the headline numbers of each run, as in report.json."""
+    return {
+        "schema_version": document.schema_version,
+        "state": document.state,
+        "accuracy_state": document.accuracy_state,
+        "digest": document.digest,
+        "verdict": document.verdict.model_dump(mode="json"),
+        "runs": [_summary(run) for run in document.runs],
+    }
+
+
+def _summary(run: Run) -> JsonValue:
+    scores = {name: getattr(run, name) for name in ("offline", "delivered", "streaming")}
+    return {
+        "mode": run.mode,
+        "clock": run.clock,
+        "frames": run.frames,
+        "outcomes": run.outcomes.model_dump(mode="json"),
+        "keyframes": len(run.keyframes),
+        "coverage": run.coverage.model_dump(mode="json"),
+        **{
+            name: None if score is None else score.model_dump(mode="json", include=_SCORE_KEYS)
+            for name, score in scores.items()
+        },
+        "latency_ms": None if run.latency_ms is None else run.latency_ms.from_arrival.model_dump(mode="json"),
+        "output_hz": None if run.throughput is None else run.throughput.output_hz,
+    }  # fmt: skip
+
+
+def _others(run: Run) -> int:
+    outcomes = run.outcomes
+    return outcomes.total - outcomes.segmented - outcomes.propagated - outcomes.dropped_busy
+
+
+_COUNTS: dict[str, Callable[[Run], int]] = {
+    "frames segmented": lambda run: run.outcomes.segmented,
+    "frames propagated": lambda run: run.outcomes.propagated,
+    "frames dropped": lambda run: run.outcomes.dropped_busy,
+    "frames without answer otherwise": _others,
+    "keyframes": lambda run: len(run.keyframes),
+}

@@ -1,0 +1,368 @@
+"""A made-up run that looks like a real one: 150 frames of an office at 10 Hz, two modes, a two-core schedule."""
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+from made_up_pictures import CLASSES, strip_frame
+
+from stsem.chance import generator
+from stsem.document.accuracy import Coverage, DistanceRow, DistanceSummary, Loss, LossParts, Score
+from stsem.document.canonical import sealed
+from stsem.document.origin import Channel, Host, Identity, Input, LogInput, StageCost
+from stsem.document.schema import Comparison, ComparisonRow, Document, Run, Verdict
+from stsem.document.timing import PERCENTILES, Distribution, Latency, Outcomes, StageLatency, Throughput
+from stsem.report.inputs import FrameRow, ReportInputs
+from stsem.result import FrameResult, Outcome, Span
+
+SHARES = (0, 1, 12, 6, 19, 9, 4, 2, 0, 7, 3, 31, 6)
+FRAMES, PERIOD_NS, FIRST_NS = 150, 100_000_000, 1_700_000_000_000_000_123
+MODES = ("per-frame", "keyframe")
+COST_MS = {"register": (8.0, 11.0), "segment": (150.0, 195.0), "propagate": (4.5, 7.0), "fuse": (14.0, 22.0)}
+
+
+def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pictures: bool = True) -> ReportInputs:
+    """Inputs of a report; without truth, from a damaged log, or without a clock."""
+    simulated = {mode: _schedule(mode, lossy) for mode in MODES}
+    rows = tuple(_with_accuracy(mode, result, truth) for mode in MODES for result in simulated[mode])
+    runs = tuple(_run(mode, [row for row in rows if row.mode == mode], truth, clock) for mode in MODES)
+    document = Document(
+        state="lossy" if lossy else "valid",
+        state_reasons=("2 messages on /camera/color fail their CRC and 1 chunk is cut off.",) if lossy else (),
+        accuracy_state="measured" if truth else "not measured",
+        accuracy_reason="" if truth else "the log has no channel with labels",
+        verdict=Verdict(
+            exit_code=3 if lossy else 0, text="Finished, but the log is damaged." if lossy else "Finished."
+        ),
+        identity=_identity(),
+        input=_input(truth, lossy),
+        config={
+            "mode": list(MODES),
+            "model": "psp18",
+            "keyframes": "paper",
+            "propagation": "homography",
+            "rate": 1,
+            "queue": "latest",
+            "cores": 2,
+            "seed": 0,
+            "clock": "real-time" if clock else "offline",
+        },
+        runs=runs,
+        comparison=_comparison(runs, truth, clock),
+        warnings=("The cost profile was measured while other work held a core; latencies may be too long.",),
+        host=_host(),
+    )
+    strip = tuple(strip_frame(i, truth) for i in (12, 47, 90, 131)) if pictures else ()
+    trace = b'{"traceEvents":[]}\n' if clock else None
+    return ReportInputs(sealed(document), rows, strip, trace=trace, trajectory=b"# stamp x y z qx qy qz qw\n")
+
+
+@dataclass
+class _Cores:
+    """The two-core schedule of the example, job after job."""
+
+    mode: str
+    free_ns: int = 0
+
+    def job(self, frame: int, stage: str, ready: int, cores: tuple[int, ...]) -> Span:
+        low, high = COST_MS[stage]
+        start = max(ready, self.free_ns if len(cores) == 2 else ready)
+        cost = int(1e6 * generator(0, stage, frame).uniform(low, high))
+        self.free_ns = start + cost
+        return Span(frame, stage, cores, ready, start, start + cost)
+
+
+def _schedule(mode: str, lossy: bool) -> list[FrameResult]:
+    cores, results, busy_until, keyframe = _Cores(mode), [], 0, None
+    for i in range(FRAMES):
+        stamp = i * PERIOD_NS
+        arrival = stamp + 12_000_000 + int(generator(1, i).uniform(0, 4e6))
+        if lossy and i in (40, 41):
+            results.append(FrameResult(i, stamp, None, None, None, Outcome.UNDECODABLE, reason="bad CRC"))
+            continue
+        if busy_until > arrival + PERIOD_NS:
+            results.append(FrameResult(i, stamp, arrival, None, None, Outcome.DROPPED_BUSY, reason="newer frame came"))
+            continue
+        taken, spans = max(arrival, busy_until), []
+        segment = mode == "per-frame" or keyframe is None or i - keyframe >= 5 + int(generator(2, i).integers(0, 4))
+        if mode == "keyframe":
+            spans.append(cores.job(i, "register", taken, (0,)))
+        stage, which = ("segment", (0, 1)) if segment else ("propagate", (0,))
+        spans.append(cores.job(i, stage, spans[-1].end_ns if spans else taken, which))
+        busy_until = answered = spans[-1].end_ns
+        if segment:
+            keyframe = i
+            if mode == "keyframe":
+                spans.append(replace(cores.job(i, "fuse", answered, (1,)), cores=(1,)))
+        reason = ("first" if i == 0 else "every frame" if mode == "per-frame" else "rotation") if segment else ""
+        outcome = Outcome.SEGMENTED if segment else Outcome.PROPAGATED
+        results.append(FrameResult(i, stamp, arrival, taken, answered, outcome, keyframe, reason, 0.97, tuple(spans)))
+    return results
+
+
+def _with_accuracy(mode: str, result: FrameResult, truth: bool) -> FrameRow:
+    chance = generator(3, result.index)
+    base = 0.93 + 0.02 * float(chance.standard_normal())
+    distance = result.index - result.keyframe if result.keyframe is not None else 0
+    offline = float(np.clip(base - 0.012 * distance * (mode == "keyframe"), 0, 1))
+    delivered = offline if result.outcome.is_answer else 0.0
+    streaming = float(np.clip(offline - (0.14 if mode == "per-frame" else 0.06), 0, 1))
+    scores = (offline, delivered, streaming) if truth else (None, None, None)
+    return FrameRow(mode, result, FIRST_NS + result.stamp_ns, result.keyframe, *scores)
+
+
+def score(base: float, key: str, n: int = FRAMES, misses: int = 0) -> Score:
+    """A plausible score around `base`."""
+    total = 480 * 270 * n
+    pixels = {name: total * share // 100 for name, share in zip(CLASSES, SHARES, strict=True)}
+    iou = {
+        name: float(np.clip(base + 0.1 * _normal(name) + 0.01 * _normal(key, name), 0.05, 0.98))
+        if pixels[name]
+        else None
+        for name in CLASSES
+    }
+    present = [value for value in iou.values() if value is not None]
+    return Score(
+        miou=float(np.mean(present)),
+        miou_union=float(np.mean(present)) * 11 / 12,
+        classes_averaged=len(present),
+        iou=iou,
+        pixel_accuracy=min(1.0, base + 0.09),
+        pixels=total,
+        misses=misses,
+        n=n,
+        class_pixels=pixels,
+        unlabelled_share=0.031,
+        miou_common=float(np.mean(present)),
+        classes_common=len(present),
+    )
+
+
+def _normal(*key: str) -> float:
+    return float(generator(4, *key).standard_normal())
+
+
+def distribution(samples_ns: list[int], n_distinct: int | None = 400) -> Distribution:
+    """Order statistics of samples, under the rule of DESIGN 5."""
+    if not samples_ns:
+        return Distribution(n_distinct=n_distinct)
+    ordered = sorted(samples_ns)
+    n = len(ordered)
+    enough = min(n, n if n_distinct is None else n_distinct)
+    given = {name: ordered[ceil(p * n) - 1] / 1e6 for name, (p, needed) in PERCENTILES.items() if enough >= needed}
+    return Distribution(**given, max=ordered[-1] / 1e6, mean=sum(ordered) / n / 1e6, n=n, n_distinct=n_distinct)
+
+
+def _run(mode: str, rows: list[FrameRow], truth: bool, clock: bool) -> Run:
+    results = [row.result for row in rows]
+    keyframes = tuple(r.index for r in results if r.outcome is Outcome.SEGMENTED)
+    passes = _scores(mode) if truth else {}
+    if not clock:
+        passes = {name: value for name, value in passes.items() if name == "offline"}
+    reasons = [r.reason for r in results if r.outcome is Outcome.SEGMENTED]
+    return Run(
+        mode=mode,
+        clock="real-time" if clock else "offline",
+        frames=FRAMES,
+        outcomes=_outcomes(results),
+        keyframes=keyframes,
+        keyframe_reasons={reason: reasons.count(reason) for reason in dict.fromkeys(reasons)},
+        stages_inside=("segment",) if mode == "per-frame" else ("register", "segment", "propagate"),
+        coverage=Coverage(frames_with_truth=FRAMES * truth, scored=FRAMES * truth, frames=FRAMES),
+        **passes,
+        loss=_loss(mode, passes) if truth and clock else None,
+        strata={"segmented": score(0.80, "s", 26), "propagated": score(0.75, "p", 124)}
+        if truth and mode == "keyframe"
+        else {},
+        by_distance=_by_distance() if truth and mode == "keyframe" else (),
+        by_distance_summary=DistanceSummary(
+            miou_mean=0.741, miou_min=0.688, pixel_accuracy_mean=0.86, pixel_accuracy_min=0.82, distances=7
+        )
+        if truth and mode == "keyframe"
+        else None,
+        latency_ms=_latency(rows) if clock else None,
+        throughput=_throughput(rows) if clock else None,
+        not_measured={
+            "map": "--map off",
+            "trajectory": "the poses of the log are used as they are",
+            **({} if truth else {"accuracy": "the log has no truth"}),
+        },
+    )
+
+
+def _scores(mode: str) -> dict[str, Score]:
+    drop = {"per-frame": (0.82, 0.66, 0.58), "keyframe": (0.76, 0.74, 0.69)}[mode]
+    names = ("offline", "delivered", "streaming")
+    return {
+        name: score(base, mode + name, misses=2 * (name == "streaming")) for name, base in zip(names, drop, strict=True)
+    }
+
+
+def _loss(mode: str, passes: dict[str, Score]) -> Loss:
+    first = _scores("per-frame")["offline"].miou or 0.0
+    offline, delivered, streaming = (passes[name].miou or 0.0 for name in ("offline", "delivered", "streaming"))
+    parts = {
+        "network": 1 - first,
+        "prediction": first - offline,
+        "scheduling": offline - delivered,
+        "staleness": delivered - streaming,
+    }
+    return Loss(**parts, n=LossParts(network=FRAMES, prediction=FRAMES, scheduling=FRAMES, staleness=FRAMES))
+
+
+def _by_distance() -> tuple[DistanceRow, ...]:
+    n = (26, 25, 24, 24, 22, 14, 10, 4, 1)
+    return tuple(
+        DistanceRow(
+            frames=d, ms=100.0 * d, miou=0.80 - 0.019 * d + 0.004 * (d % 2), pixel_accuracy=0.92 - 0.011 * d, n=count
+        )
+        for d, count in enumerate(n)
+    )
+
+
+def _outcomes(results: list[FrameResult]) -> Outcomes:
+    counts = {str(outcome): sum(r.outcome is outcome for r in results) for outcome in Outcome}
+    return Outcomes.model_validate(counts)
+
+
+def _latency(rows: list[FrameRow]) -> Latency:
+    answered = [row for row in rows if row.latency_ns is not None]
+    stages = {
+        stage: StageLatency(
+            waiting=distribution([w for row in rows if (w := row.waiting_ns(stage)) is not None], None),
+            service=distribution([s for row in rows if (s := row.service_ns(stage)) is not None]),
+        )
+        for stage in COST_MS
+        if any(row.service_ns(stage) is not None for row in rows)
+    }
+    arrival = [row.latency_ns or 0 for row in answered]
+    stamp = [(row.result.answered_ns or 0) - row.result.stamp_ns for row in answered]
+    waiting = [(row.result.taken_ns or 0) - (row.result.arrival_ns or 0) for row in answered]
+    return Latency(
+        from_arrival=distribution(arrival),
+        from_stamp=distribution(stamp),
+        waiting=distribution(waiting, None),
+        stages=stages,
+    )
+
+
+def _throughput(rows: list[FrameRow]) -> Throughput:
+    times = sorted(row.result.answered_ns for row in rows if row.result.answered_ns is not None)
+    end = times[-1]
+    busy = [
+        sum(s.end_ns - s.start_ns for row in rows for s in row.result.spans if core in s.cores) / end for core in (0, 1)
+    ]
+    late = sum(row.latency_ns is None or row.latency_ns > PERIOD_NS for row in rows)
+    return Throughput(
+        output_hz=(len(times) - 1) / (end - times[0]) * 1e9,
+        offered_hz=10.0,
+        outputs=len(times),
+        processed_share=len(times) / len(rows),
+        utilisation=tuple(min(1.0, share) for share in busy),
+        deadline_ms=100.0,
+        deadline_misses=late,
+        jitter_ms=float(np.std(np.diff(times))) / 1e6,
+        real_time_factor=0.985,
+    )
+
+
+def _comparison(runs: tuple[Run, ...], truth: bool, clock: bool) -> Comparison:
+    base, other = runs
+    rows = []
+    for name in ("offline", "delivered", "streaming"):
+        for key in ("miou", "pixel_accuracy"):
+            a, b = getattr(base, name), getattr(other, name)
+            if a and b:
+                delta = getattr(b, key) - getattr(a, key)
+                rows.append(
+                    ComparisonRow(
+                        metric=f"{name}.{key}",
+                        base=getattr(a, key),
+                        other=getattr(b, key),
+                        delta=delta,
+                        ci95=(delta - 0.012, delta + 0.015),
+                        n=FRAMES,
+                        unit="fraction",
+                    )
+                )
+    if clock and base.latency_ms and other.latency_ms and base.throughput and other.throughput:
+        for key in ("mean", "p50", "max"):
+            x, y = getattr(base.latency_ms.from_arrival, key), getattr(other.latency_ms.from_arrival, key)
+            rows.append(
+                ComparisonRow(
+                    metric=f"latency_ms.from_arrival.{key}",
+                    base=x,
+                    other=y,
+                    delta=y - x,
+                    n=FRAMES,
+                    unit="ms",
+                    higher_is_better=False,
+                    ci95=(y - x - 9, y - x + 7) if key == "mean" else None,
+                    why_no_interval="" if key == "mean" else "no interval is computed for it",
+                )
+            )
+        hz = base.throughput.output_hz or 0.0, other.throughput.output_hz or 0.0
+        rows.append(
+            ComparisonRow(
+                metric="throughput.output_hz",
+                base=hz[0],
+                other=hz[1],
+                delta=hz[1] - hz[0],
+                n=FRAMES,
+                unit="Hz",
+                why_no_interval="a rate of the whole run",
+            )
+        )
+    return Comparison(base=base.mode, other=other.mode, rows=tuple(rows))
+
+
+def _identity() -> Identity:
+    return Identity(
+        backend="onnxruntime",
+        precision="f32",
+        versions={"stsem": "0.1.0", "onnxruntime": "1.30.0", "python": "3.11.2"},
+        cpu_features=("avx2", "fma"),
+        model="psp18",
+        model_sha256="ab" * 32,
+        sidecar_sha256="cd" * 32,
+        costs="reference.json",
+        costs_sha256="ef" * 32,
+        costs_disturbed=True,
+    )
+
+
+def _input(truth: bool, lossy: bool) -> Input:
+    channels = {
+        "color": Channel(topic="/camera/color", messages=FRAMES, schema_name="foxglove.RawImage", offset_ms=12.1),
+        "pose": Channel(topic="/tf", messages=600, schema_name="foxglove.FrameTransforms", offset_ms=0.4),
+        "labels": Channel(topic="/labels", messages=FRAMES, schema_name="foxglove.RawImage", offset_ms=12.1),
+    }
+    if not truth:
+        del channels["labels"]
+    log = LogInput(
+        name="office.mcap",
+        sha256="12" * 32,
+        frames=FRAMES,
+        frames_with_truth=FRAMES * truth,
+        duration_s=14.9,
+        period_ms=100.0,
+        size=(480, 270),
+        truth_size=(480, 270) if truth else None,
+        channels=channels,
+        damage={"crc_failures": 2, "truncated_chunks": 1} if lossy else {},
+    )
+    return Input(logs=(log,), classes=CLASSES if truth else (), classes_unknown_to_network=("books",) if truth else ())
+
+
+def _host() -> Host:
+    return Host(
+        paths={"log": "logs/office.mcap"},
+        command="stsem-replay logs/office.mcap --costs bench/costs/reference.json",
+        machine={"processor": "some CPU", "cores": "2", "memory": "8 GiB"},
+        started_at="2026-01-02T03:04:05+00:00",
+        wall_s=41.2,
+        cpu_s=70.9,
+        stages={"segment": StageCost(mean_ms=171.0, max_ms=196.0, n=150)},
+        overhead_ms=4.1,
+        peak_memory_bytes=512 << 20,
+    )
