@@ -59,6 +59,17 @@ class Judged:
     miou_common: float | None = None
     classes_common: int | None = None
 
+    @property
+    def class_pixels(self) -> npt.NDArray[np.int64]:
+        """(C,) truth pixels of each class: the basis of its IoU."""
+        return np.asarray(self.matrix.sum(axis=1))
+
+    @property
+    def unlabelled_share(self) -> float:
+        """Share of the judged pixels that got no label; NaN without pixels."""
+        pixels = int(self.matrix.sum())
+        return int(self.matrix[:, -1].sum()) / pixels if pixels else float("nan")
+
 
 class FrameTallies:
     """Accumulates one judgement frame by frame.

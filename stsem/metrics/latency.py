@@ -1,83 +1,124 @@
-"""Latencies: order statistics that are only stated when there are enough samples for them."""
+"""How late answers are: from arrival, from the sensor's stamp, and where the time goes (DESIGN 5)."""
 
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-MIN_SAMPLES = {500: 11, 900: 64, 950: 130, 990: 662, 999: 6636}
-"""Per mille -> samples from which that percentile is stated (MLPerf LoadGen's early-stopping bound)."""
+from stsem.metrics.durations import Summary, summarise
+from stsem.result import FrameResult, Span
+
+ANSWER_STAGES = ("decode", "register", "select", "segment", "propagate")
+"""Stages on the answer path; `fuse` works beside it, `track` too unless the propagation needs its pose."""
 
 
 @dataclass(frozen=True)
-class Summary:
-    """Order statistics of one kind of duration, in milliseconds.
+class StageTiming:
+    """One stage over all its jobs: waiting = start - ready, service = end - start."""
+
+    waiting: Summary
+    service: Summary
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Latencies of the answered frames on the simulated clock.
 
     Args:
-        p50, p90, p95, p99, p999: sorted[ceil(p n) - 1], no interpolation; None: n too small (see `MIN_SAMPLES`).
-        max, mean: always stated.
-        n: durations.
-        n_effective: what `MIN_SAMPLES` was applied to: the smaller of n and the distinct samples behind them.
+        from_arrival: answered - arrived: the pipeline's own share.
+        from_stamp: answered - captured: from sensor to result.
+        waiting: the part of `from_arrival` during which no job of the frame's answer held a core.
+        stages: every stage that ran, on and beside the answer path.
+        inside: the stages that ran between arrival and answer: what `from_arrival` contains.
     """
 
-    p50: float | None
-    p90: float | None
-    p95: float | None
-    p99: float | None
-    p999: float | None
-    max: float
-    mean: float
-    n: int
-    n_effective: int
+    from_arrival: Summary | None
+    from_stamp: Summary | None
+    waiting: Summary | None
+    stages: Mapping[str, StageTiming]
+    inside: tuple[str, ...]
 
 
-def percentile_ns(ascending_ns: list[int], per_mille: int) -> int:
-    """sorted[ceil(p n) - 1] with p = `per_mille` / 1000, in integers.
-
-    Raises:
-        ValueError: the list is empty or `per_mille` is not in 1..1000.
-    """
-    if not ascending_ns or not 1 <= per_mille <= 1000:
-        raise ValueError(f"no {per_mille} per mille point of {len(ascending_ns)} durations")
-    return ascending_ns[-(-per_mille * len(ascending_ns) // 1000) - 1]
-
-
-def summarise(durations_ns: Iterable[int], distinct_samples: int | None = None) -> Summary | None:
-    """Summary of durations in nanoseconds; None when there are none.
+def latency(
+    results: Iterable[FrameResult],
+    spans: Sequence[Span],
+    *,
+    distinct_samples: int | None = None,
+    answer_stages: Sequence[str] = ANSWER_STAGES,
+) -> Latency:
+    """Latencies of a run.
 
     Args:
-        durations_ns: in any order.
-        distinct_samples: of the slowest stage's cost profile: replaying 12 measured costs 10,000 times does not make
-            a p99. None: the durations are independent measurements.
+        results: of every frame.
+        spans: every job of the run.
+        distinct_samples: of the slowest stage's cost profile; limits which percentiles are stated. None: no limit.
+        answer_stages: stages on the answer path.
     """
-    ascending = sorted(durations_ns)
-    if not ascending:
-        return None
-    n = len(ascending)
-    effective = n if distinct_samples is None else min(n, distinct_samples)
-
-    def point(per_mille: int) -> float | None:
-        return percentile_ns(ascending, per_mille) / 1e6 if effective >= MIN_SAMPLES[per_mille] else None
-
-    return Summary(
-        p50=point(500), p90=point(900), p95=point(950), p99=point(990), p999=point(999),
-        max=ascending[-1] / 1e6, mean=sum(ascending) / n / 1e6, n=n, n_effective=effective,
-    )  # fmt: skip
+    meter = LatencyMeter(distinct_samples, answer_stages)
+    for result in results:
+        meter.update(result)
+    return meter.compute(spans)
 
 
-class Durations:
-    """Accumulates one kind of duration; every sample is kept, for percentiles and plots."""
+class LatencyMeter:
+    """Accumulates the answered frames of a run; keeps three integers a frame.
+
+    Args:
+        distinct_samples, answer_stages: as of `latency`.
+    """
 
     unit: ClassVar[str] = "ms"
     higher_is_better: ClassVar[bool] = False
 
-    def __init__(self, distinct_samples: int | None = None) -> None:
-        self._distinct = distinct_samples
-        self.samples_ns: list[int] = []
+    def __init__(self, distinct_samples: int | None = None, answer_stages: Sequence[str] = ANSWER_STAGES) -> None:
+        self._distinct, self._path = distinct_samples, frozenset(answer_stages)
+        self._answered: dict[int, tuple[int, int, int]] = {}
 
-    def update(self, duration_ns: int) -> None:
-        """Add one duration in nanoseconds."""
-        self.samples_ns.append(duration_ns)
+    def update(self, result: FrameResult) -> None:
+        """Add a frame; one without an answer on the clock has no latency."""
+        if result.outcome.is_answer and result.arrival_ns is not None and result.answered_ns is not None:
+            self._answered[result.index] = (result.stamp_ns, result.arrival_ns, result.answered_ns)
 
-    def compute(self) -> Summary | None:
-        """Summary so far; None before the first duration."""
-        return summarise(self.samples_ns, self._distinct)
+    def compute(self, spans: Sequence[Span]) -> Latency:
+        """The latencies, given every job of the run."""
+        inside = [span for span in spans if self._is_inside(span)]
+        jobs: defaultdict[int, list[Span]] = defaultdict(list)
+        for span in inside:
+            jobs[span.frame].append(span)
+        times = self._answered.items()
+        return Latency(
+            from_arrival=self._summary(end - arrival for _, (_, arrival, end) in times),
+            from_stamp=self._summary(end - stamp for _, (stamp, _, end) in times),
+            waiting=self._summary(end - arrival - _busy_ns(jobs[i]) for i, (_, arrival, end) in times),
+            stages=stage_timings(spans, self._distinct),
+            inside=tuple(dict.fromkeys(span.stage for span in sorted(inside, key=lambda s: (s.start_ns, s.frame)))),
+        )
+
+    def _is_inside(self, span: Span) -> bool:
+        found = self._answered.get(span.frame)
+        return found is not None and span.stage in self._path and span.end_ns <= found[2]
+
+    def _summary(self, durations_ns: Iterable[int]) -> Summary | None:
+        return summarise(durations_ns, self._distinct)
+
+
+def stage_timings(spans: Iterable[Span], distinct_samples: int | None = None) -> dict[str, StageTiming]:
+    """Waiting and service by stage, in order of the names."""
+    waiting: defaultdict[str, list[int]] = defaultdict(list)
+    service: defaultdict[str, list[int]] = defaultdict(list)
+    for span in spans:
+        waiting[span.stage].append(span.start_ns - span.ready_ns)
+        service[span.stage].append(span.end_ns - span.start_ns)
+    found = {
+        s: (summarise(waiting[s], distinct_samples), summarise(service[s], distinct_samples)) for s in sorted(waiting)
+    }
+    return {stage: StageTiming(w, s) for stage, (w, s) in found.items() if w is not None and s is not None}
+
+
+def _busy_ns(spans: Iterable[Span]) -> int:
+    """Length of the union of the spans: two jobs of a frame side by side count once."""
+    total, until = 0, -1
+    for span in sorted(spans, key=lambda s: s.start_ns):
+        total += max(0, span.end_ns - max(span.start_ns, until))
+        until = max(until, span.end_ns)
+    return total

@@ -11,7 +11,7 @@ from stsem.classes import ClassSet, Labels
 from stsem.metrics.accumulate import FrameTallies, Judged, Samples
 from stsem.metrics.by_distance import ByDistance, DistanceRow, DistanceSummary, summarise
 from stsem.metrics.confusion import Matrix, confusion
-from stsem.metrics.latency import Durations, Summary
+from stsem.metrics.durations import Durations, Summary
 from stsem.metrics.scores import tally
 from stsem.result import Outcome
 

@@ -1,0 +1,103 @@
+"""Cutting a log into stretches that are long enough to be independent of each other.
+
+Neighbouring frames show the same thing, so they are not a sample of n independent frames. Resampling stretches of at
+least three autocorrelation times keeps that dependence inside them (Künsch 1989; Politis and Romano 1994).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+MIN_BLOCKS = 8
+MAX_BLOCKS = 100
+AUTOCORRELATION_TIMES = 3.0
+_WINDOW = 5.0
+
+
+@dataclass(frozen=True)
+class NoInterval:
+    """There is no honest interval, and why."""
+
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Stretches of equal log time.
+
+    Args:
+        of_frame: (n,) int64, number of the block that each frame is in, 0..count - 1; empty stretches have no number.
+        count: blocks with frames.
+        length_ns: log time of one block.
+        autocorrelation_ns: the longest autocorrelation time found.
+        inflation: what the variance between independent blocks is multiplied by for the correlation that is left
+            between neighbours: 1 + (tau^2 - 1) / (2 l tau) for blocks of l samples whose correlation decays
+            exponentially, from cov(neighbours) = sigma^2 (tau^2 - 1) / 4 and var(block) = sigma^2 l tau. At most 1 + 1/6.
+    """
+
+    of_frame: npt.NDArray[np.int64]
+    count: int
+    length_ns: int
+    autocorrelation_ns: int
+    inflation: float
+
+    def sums(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """(count, ...) sums over the frames of each block of values (n, ...)."""
+        result = np.zeros((self.count, *values.shape[1:]), np.float64)
+        np.add.at(result, self.of_frame, values)
+        return result
+
+
+def autocorrelation_time(series: npt.NDArray[np.float64]) -> float:
+    """Integrated autocorrelation time 1 + 2 sum rho(k) in samples, at least 1.
+
+    The sum ends at the first lag M >= 5 tau(M) (Sokal 1997, section 3) and is corrected by 1 + (2 M + 1) / n for the
+    estimated mean (Wolff 2004, equation 49). NaN samples are left out; a constant series has 1.
+    """
+    x = series[~np.isnan(series)]
+    x = x - x.mean() if len(x) else x
+    power = float(x @ x)
+    if len(x) < 2 or power <= 1e-12 * len(x):
+        return 1.0
+    spectrum = np.fft.rfft(x, 2 * len(x))
+    covariance = np.fft.irfft(spectrum * np.conj(spectrum))[: len(x)]
+    tau = 2 * np.cumsum(covariance / covariance[0]) - 1
+    enough = np.flatnonzero(np.arange(len(x)) >= _WINDOW * tau)
+    last = int(enough[0]) if len(enough) else len(x) - 1
+    return max(1.0, float(tau[last]) * (1 + (2 * last + 1) / len(x)))
+
+
+def cut(stamps_ns: npt.NDArray[np.int64], series: Sequence[npt.NDArray[np.float64]]) -> Blocks | NoInterval:
+    """Cut a log into as many equal stretches of time as the slowest of the series allows.
+
+    Args:
+        stamps_ns: (n,) ascending stamps of the judged frames.
+        series: of (n,) per-frame values, one for every mode and difference that will use these blocks.
+
+    Returns:
+        8 to 100 blocks of at least 3 autocorrelation times; `NoInterval` where fewer than 8 fit.
+    """
+    if len(stamps_ns) < MIN_BLOCKS:
+        return NoInterval(f"{len(stamps_ns)} judged frames cannot make {MIN_BLOCKS} blocks")
+    period_ns = max(1, int(np.median(np.diff(stamps_ns))))
+    tau = max(autocorrelation_time(values) for values in series)
+    tau_ns = int(tau * period_ns)
+    extent_ns = int(stamps_ns[-1] - stamps_ns[0]) + period_ns
+    count = min(MAX_BLOCKS, int(extent_ns // (AUTOCORRELATION_TIMES * tau_ns)))
+    if count < MIN_BLOCKS:
+        return NoInterval(_too_short(count, tau_ns, extent_ns))
+    stretch = (stamps_ns - stamps_ns[0]) * count // extent_ns
+    numbers, of_frame = np.unique(stretch, return_inverse=True)
+    if len(numbers) < MIN_BLOCKS:
+        return NoInterval(_too_short(len(numbers), tau_ns, extent_ns))
+    inflation = 1 + (tau - 1 / tau) * period_ns * count / (2 * extent_ns)
+    return Blocks(of_frame.astype(np.int64), len(numbers), extent_ns // count, tau_ns, inflation)
+
+
+def _too_short(count: int, tau_ns: int, extent_ns: int) -> str:
+    return (
+        f"{extent_ns / 1e9:.1f} s hold {count} blocks of 3 autocorrelation times ({tau_ns / 1e9:.2f} s each), "
+        f"and {MIN_BLOCKS} are needed"
+    )
