@@ -84,7 +84,7 @@ def render(sidecar: Sidecar) -> str:
     if sidecar.classes.colours:
         lines.append(f"colours = {[list(colour) for colour in sidecar.classes.colours]}")
     if sidecar.note:
-        lines.append(f"note = {json.dumps(sidecar.note)}")
+        lines.append(f"note = {_string(sidecar.note)}")
     if sidecar.difference:
         lines += ["", "[difference]  # RGB in 0..1 at the network's size, zero for the first frame",
                   f'sign = "{SIGN}"', f"scale = {sidecar.difference.scale}", f'partner = "{PARTNER}"']  # fmt: skip
@@ -92,7 +92,12 @@ def render(sidecar: Sidecar) -> str:
 
 
 def _quoted(names: Iterable[str]) -> str:
-    return "[" + ", ".join(json.dumps(name) for name in names) + "]"
+    return "[" + ", ".join(map(_string, names)) + "]"
+
+
+def _string(text: str) -> str:
+    """A TOML basic string: as JSON's, but beyond it DEL must be escaped and surrogate pairs are not allowed."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _check_keys(table: Mapping[str, object], valid: tuple[str, ...], where: str, section: str) -> None:
