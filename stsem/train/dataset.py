@@ -48,7 +48,7 @@ class PairFolder:
         """The pair at `index`. Raises TrainingError when its file is damaged."""
         path = self._paths[index]
         try:
-            with np.load(path) as arrays:
+            with path.open("rb") as file, np.load(file) as arrays:
                 return Pair(arrays["images"], arrays["labels"])
         except (OSError, KeyError, ValueError, zipfile.BadZipFile) as err:
             raise TrainingError(

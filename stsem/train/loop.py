@@ -1,5 +1,6 @@
 """The training loop: pairs in, checkpoints out. Any iteration can be repeated: its draws are keyed by its number."""
 
+import zipfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,9 +19,6 @@ from stsem.train.augment import Augmentation, View, view
 from stsem.train.dataset import PairFolder
 from stsem.train.objective import Objective
 
-WARM_UP = 200
-"""Iterations over which the learning rate rises from zero."""
-
 
 @dataclass(frozen=True)
 class Schedule:
@@ -29,6 +27,7 @@ class Schedule:
     Args:
         iterations, batch: how long, and how many views each.
         rate: largest learning rate of AdamW; it falls as (1 - i / iterations) ** power (Zhao et al., section 5.1).
+        warm_up: iterations over which the rate rises from zero first.
         power, decay: of the fall, and weight decay.
         average: factor of the running mean of the weights, which is what gets published.
         seed: of every draw.
@@ -39,6 +38,7 @@ class Schedule:
     iterations: int
     batch: int = 8
     rate: float = 2e-3
+    warm_up: int = 200
     power: float = 0.9
     decay: float = 1e-2
     average: float = 0.998
@@ -49,7 +49,7 @@ class Schedule:
     def rate_at(self, iteration: int) -> float:
         """Learning rate of an iteration, counted from 0."""
         fall: float = (1 - iteration / self.iterations) ** self.power
-        return self.rate * min(1.0, (iteration + 1) / WARM_UP) * fall
+        return self.rate * min(1.0, (iteration + 1) / self.warm_up) * fall
 
 
 @dataclass(frozen=True)
@@ -166,10 +166,12 @@ def tensors(views: list[View], sidecar: Sidecar) -> tuple[torch.Tensor, torch.Te
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
     """A checkpoint's state; tensors and plain values only. Raises TrainingError."""
+    if not zipfile.is_zipfile(path):  # torch would ask for an unsafe way to read it
+        raise TrainingError(f"The checkpoint {path} is missing or damaged; give one that a training wrote.")
     try:
         state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
     except (OSError, RuntimeError, EOFError, ValueError) as err:
-        raise TrainingError(f"The checkpoint {path} cannot be read ({err}); give one that stsem train wrote.") from err
+        raise TrainingError(f"The checkpoint {path} cannot be read ({err}); give one that a training wrote.") from err
     return state
 
 
