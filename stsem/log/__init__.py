@@ -1,0 +1,1 @@
+"""Recorded logs: reading, damage, decoding, choice of channels, frames, truth; and writing."""

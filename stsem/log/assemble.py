@@ -1,0 +1,240 @@
+"""From a scanned log to what is used of it: the channels, the class table, the calibration, the poses, the clocks."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from stsem.camera import Camera
+from stsem.errors import ChannelError, DecodeError, UsageError
+from stsem.log import pixels
+from stsem.log.choose import (
+    Candidate,
+    check_overrides,
+    choose_calibration,
+    choose_color,
+    choose_partner,
+    choose_pose,
+    nearest_track,
+)
+from stsem.log.classtable import ClassTable, find_table
+from stsem.log.files import Store
+from stsem.log.messages import Kind
+from stsem.log.plan import clock_offset_ns, out_of_range
+from stsem.log.poses import PoseSource, stamped_poses, transform_chain
+from stsem.log.reading import ImageChannel
+from stsem.log.scan import Scan
+from stsem.log.tracks import Track
+
+REGISTERED = ("auto", "yes", "no")
+
+
+@dataclass
+class Assembly:
+    """What is used of a log.
+
+    Args:
+        color, depth, labels: image channels; None when there is none or it cannot be used.
+        size: (width, height) of the colour images.
+        poses: where the camera's pose comes from.
+        calibration: the channel it was taken from.
+        camera: intrinsics for colour images of `size`.
+        table: class table of the labels.
+        clock_offsets_ns: topic -> what is taken out of its log times; only those that differ from 0.
+        warnings: one sentence each.
+    """
+
+    color: ImageChannel
+    size: tuple[int, int]
+    depth: ImageChannel | None = None
+    labels: ImageChannel | None = None
+    poses: PoseSource | None = None
+    calibration: Track | None = None
+    camera: Camera | None = None
+    table: ClassTable | None = None
+    clock_offsets_ns: dict[str, int] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def pose_topic(self) -> str | None:
+        """Topic that the poses come from."""
+        return self.poses.topic if self.poses else None
+
+
+def assemble(
+    scan: Scan, store: Store, topics: Mapping[str, str], classes_file: Path | None, depth_registered: str
+) -> Assembly:
+    """Choose the channels and read what is needed to know how frames are made of them.
+
+    Raises:
+        UsageError: a value that cannot be.
+        ChannelError: no colour images, two cameras with an equal claim, or an asked-for topic that does not fit.
+        ClassTableError: a class table that cannot be used.
+    """
+    if depth_registered not in REGISTERED:
+        raise UsageError(f"--depth-registered is {depth_registered!r}, but it can be {', '.join(REGISTERED)}.")
+    tracks = list(scan.tracks.values())
+    asked = check_overrides(topics, tracks)
+    channels = {
+        id(t): ImageChannel(t, store, scan.damage)
+        for t in tracks if t.kind in (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO) and t.count
+    }  # fmt: skip
+    images = [Candidate(channel.track, channel.look()) for channel in channels.values()]
+    color = _asked(images, asked, "color") or choose_color(images, tracks)
+    result = Assembly(channels[id(color.track)], (0, 0))
+    result.size = _size(result.color)
+    others = [c for c in images if c is not color]
+    depth = _partner(others, asked, "depth", color, result.warnings)
+    labels = _partner([c for c in others if c is not depth], asked, "labels", color, result.warnings)
+    if depth is not None:
+        result.depth = _usable_depth(channels[id(depth.track)], depth, color, result, depth_registered)
+    if labels is not None:
+        result.labels = channels[id(labels.track)]
+    _find_classes(result, scan, classes_file)
+    _find_camera(result, tracks, color)
+    _find_poses(result, tracks, asked.get("pose"), color.look.frame_id)
+    _find_clock_offsets(result)
+    result.warnings += [
+        t.trouble[0].upper() + t.trouble[1:] + "; its messages are not used." for t in tracks if t.trouble
+    ]
+    result.warnings += [
+        f"{c.track.unstamped} of {c.track.count} messages on {c.topic} have no capture stamp: their log time is used."
+        for c in (result.color, result.depth, result.labels) if c and c.track.unstamped
+    ]  # fmt: skip
+    return result
+
+
+def _asked(images: Sequence[Candidate], asked: Mapping[str, Track], role: str) -> Candidate | None:
+    track = asked.get(role)
+    if track is None:
+        return None
+    found = next((c for c in images if c.track is track), None)
+    if found is None:
+        raise ChannelError(f"{track.topic} was given for {role}, but it has no message; choose another topic.")
+    return found
+
+
+def _partner(
+    images: Sequence[Candidate], asked: Mapping[str, Track], role: str, color: Candidate, warnings: list[str]
+) -> Candidate | None:
+    if found := _asked(images, asked, role):
+        return found
+    found, warning = choose_partner(images, role, color)
+    if warning:
+        warnings.append(warning)
+    return found
+
+
+def _size(color: ImageChannel) -> tuple[int, int]:
+    """Size of the first colour image that can be decoded."""
+    found = color.first(lambda message: pixels.colour(message).shape)
+    if found is None:
+        try:
+            color.read(0, pixels.colour)
+        except DecodeError as err:
+            raise ChannelError(
+                f"No image of {color.topic} can be decoded: {err.reason}; choose another with --topic color=TOPIC."
+            ) from err
+        raise ChannelError(f"No image of {color.topic} can be decoded; choose another with --topic color=TOPIC.")
+    return found[1][1], found[1][0]
+
+
+def _usable_depth(
+    channel: ImageChannel, depth: Candidate, color: Candidate, result: Assembly, registered: str
+) -> ImageChannel | None:
+    """The depth channel if its pixels are those of the colour image."""
+    found = channel.first(lambda message: pixels.depth(message).shape)
+    if found is None:
+        result.warnings.append(
+            f"No depth image of {channel.topic} can be decoded ({depth.look.name}): depth is not used."
+        )
+        return None
+    height, width = found[1]
+    if registered == "no":
+        result.warnings.append(
+            f"{channel.topic} is not registered to the colour camera (--depth-registered no): not used."
+        )
+        return None
+    if (width, height) != result.size:
+        result.warnings.append(
+            f"{channel.topic} is {width}x{height} but colour is {result.size[0]}x{result.size[1]}: "
+            "depth of another size is not registered yet and not used."
+        )
+        return None
+    if registered == "auto" and depth.look.frame_id != color.look.frame_id:
+        result.warnings.append(
+            f"{channel.topic} is in frame {depth.look.frame_id!r} and colour in {color.look.frame_id!r}: "
+            "taken as registered, being of the same size (--depth-registered yes|no)."
+        )
+    return channel
+
+
+def _find_classes(result: Assembly, scan: Scan, classes_file: Path | None) -> None:
+    tables = [t for t in scan.tracks.values() if t.kind is Kind.CLASS_TABLE and t.class_names]
+    topic = result.labels.topic if result.labels else ""
+    nearest = nearest_track(tables, topic)
+    messages = nearest.class_names[-1].names if nearest else None
+    if nearest and len(nearest.class_names) > 1:
+        result.warnings.append(
+            f"{nearest.topic} changes its class table {len(nearest.class_names) - 1} times; the last one is used."
+        )
+    table, warnings = find_table(classes_file, messages, scan.metadata, scan.attachments)
+    if result.labels is None:
+        return
+    result.warnings += warnings
+    result.table = table
+    if table is None:
+        result.warnings.append(
+            f"{topic} holds labels, but no class table names them: accuracy cannot be measured (give --classes FILE)."
+        )
+
+
+def _find_camera(result: Assembly, tracks: Sequence[Track], color: Candidate) -> None:
+    track = choose_calibration(tracks, color)
+    if track is None:
+        return
+    result.calibration = track
+    camera = next((c.camera for c in track.calibrations if c.camera), None)
+    if camera is None:
+        result.warnings.append(f"{track.topic} says that the camera is uncalibrated (K is zero): no intrinsics.")
+        return
+    if len(track.calibrations) > 1:
+        result.warnings.append(
+            f"{track.topic} changes {len(track.calibrations) - 1} times; the first calibration is used."
+        )
+    if camera.width <= 0 or camera.height <= 0:
+        camera = Camera(*result.size, camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion, camera.model)
+    if (camera.width, camera.height) != result.size:
+        result.warnings.append(
+            f"{track.topic} is for {camera.width}x{camera.height}, the images are {result.size[0]}x{result.size[1]}: "
+            "intrinsics are scaled."
+        )
+        camera = camera.scaled(*result.size)
+    if camera.is_distorted:
+        result.warnings.append(
+            f"{track.topic} states lens distortion ({camera.model or 'no model'}), which is not undone."
+        )
+    result.camera = camera
+
+
+def _find_poses(result: Assembly, tracks: Sequence[Track], asked: Track | None, frame_id: str) -> None:
+    """The chain of transforms if it reaches the camera, else the channel of stamped poses; or what was asked for."""
+    transforms = [t for t in tracks if t.kind is Kind.TRANSFORMS and t.transforms]
+    if transforms and (asked is None or asked.kind is Kind.TRANSFORMS):
+        result.poses, warnings = transform_chain(transforms, frame_id)
+        result.warnings += warnings
+    if result.poses is None:
+        track, warning = (asked, "") if asked else choose_pose(tracks)
+        if track is not None and track.kind is Kind.POSE:
+            result.poses, warnings = stamped_poses(track)
+            result.warnings += warnings + ([warning] if warning else [])
+
+
+def _find_clock_offsets(result: Assembly) -> None:
+    offsets = {c.topic: clock_offset_ns(c.rows) for c in (result.color, result.depth, result.labels) if c}
+    if result.poses:
+        offsets[result.poses.topic] = out_of_range(result.poses.offset_ns())
+    result.clock_offsets_ns = {topic: offset for topic, offset in sorted(offsets.items()) if offset}
+    result.warnings += [
+        f"The clock of {topic} is off: its log times are {offset / 1e9:.3f} s behind its stamps or more; taken out."
+        for topic, offset in result.clock_offsets_ns.items()
+    ]

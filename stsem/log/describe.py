@@ -1,0 +1,86 @@
+"""The facts of an opened log: names, channels, what is used as what."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stsem.log.assemble import Assembly
+from stsem.log.info import ChannelInfo, Choice, LogInfo
+from stsem.log.messages import Kind
+from stsem.log.poses import is_static
+from stsem.log.scan import Scan
+from stsem.log.tracks import Track
+
+
+def describe(paths: Sequence[Path], scan: Scan, assembly: Assembly) -> LogInfo:
+    """Everything that can be said without decoding more images."""
+    tracks = sorted(scan.tracks.values(), key=lambda track: (track.topic, track.encoding, track.schema))
+    roles = _roles(assembly, tracks)
+    stamps = assembly.color.rows.stamp_ns
+    return LogInfo(
+        name=_name(paths),
+        paths=tuple(file.path for file in scan.files),
+        sha256=scan.sha256,
+        size_bytes=sum(file.size for file in scan.files),
+        duration_s=int(stamps[-1] - stamps[0]) / 1e9,
+        channels=tuple(_channel(track, roles.get(id(track), "")) for track in tracks),
+        choice=_choice(assembly),
+        damage=scan.damage,
+        warnings=tuple(assembly.warnings),
+        clock_offsets_ns=dict(assembly.clock_offsets_ns),
+        library=scan.library,
+        profile=scan.profile,
+    )
+
+
+def _name(paths: Sequence[Path]) -> str:
+    """Name of the only file or folder; of several files, of the first in order of their names."""
+    first = min(paths, key=lambda path: path.name)
+    resolved = first.resolve()
+    return resolved.name if resolved.is_dir() else first.stem
+
+
+def _choice(assembly: Assembly) -> Choice:
+    return Choice(
+        color=assembly.color.topic,
+        depth=assembly.depth.topic if assembly.depth else None,
+        pose=assembly.pose_topic,
+        labels=assembly.labels.topic if assembly.labels else None,
+        calibration=assembly.calibration.topic if assembly.calibration else None,
+    )
+
+
+def _roles(assembly: Assembly, tracks: Sequence[Track]) -> dict[int, str]:
+    """id of track -> what it is used as; tracks that are not used are absent."""
+    channels = {"color": assembly.color, "depth": assembly.depth, "labels": assembly.labels}
+    found = {id(channel.track): role for role, channel in channels.items() if channel}
+    if assembly.calibration:
+        found[id(assembly.calibration)] = "calibration"
+    for track in tracks:
+        if assembly.poses and not assembly.poses.by_chain and track.topic == assembly.poses.topic:
+            found[id(track)] = "pose"
+        elif assembly.poses and assembly.poses.by_chain and track.kind is Kind.TRANSFORMS:
+            found[id(track)] = "tf_static" if is_static(track) else "tf"
+        elif track.kind is Kind.CLASS_TABLE and assembly.table:
+            found[id(track)] = "classes"
+    return found
+
+
+def _channel(track: Track, role: str) -> ChannelInfo:
+    offsets = track.stamp_offsets_ns()
+    first, last = track.first_log_ns, track.last_log_ns
+    span = 0 if first is None or last is None else last - first
+    return ChannelInfo(
+        topic=track.topic,
+        schema=track.schema,
+        encoding=track.encoding,
+        count=track.count,
+        rate_hz=(track.count - 1) / (span / 1e9) if span else None,
+        first_log_ns=first,
+        last_log_ns=last,
+        offset_min_ns=int(offsets.min()) if len(offsets) else None,
+        offset_median_ns=int(np.median(offsets)) if len(offsets) else None,
+        largest_gap_s=track.largest_gap_ns / 1e9 if track.count > 1 else None,
+        role=role,
+    )

@@ -1,0 +1,150 @@
+"""The files of a log, and random access to the payloads of its messages."""
+
+import os
+import re
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Self
+
+from stsem.errors import LogError
+from stsem.log.container import BrokenChunkError, Chunk, decompress, open_file
+
+CACHE_BYTES = 64 << 20
+
+
+@dataclass(frozen=True)
+class File:
+    """A file of a log, its size in bytes, and the place of its first byte in the log."""
+
+    path: Path
+    size: int
+    base: int
+
+
+def find_files(paths: Sequence[Path]) -> tuple[File, ...]:
+    """The .mcap files that `paths` mean, in natural order of their names: files as they are, folders by what they hold.
+
+    Raises:
+        LogError: nothing was given, a path does not exist, or a folder holds no recording.
+    """
+    if not paths:
+        raise LogError("No log was given; give the path of an MCAP recording.")
+    unique = {os.path.realpath(path): path for given in paths for path in _expand(given)}
+    files: list[File] = []
+    for path in sorted(unique.values(), key=_natural):
+        base = files[-1].base + files[-1].size if files else 0
+        files.append(File(path, path.stat().st_size, base))
+    return tuple(files)
+
+
+def _expand(path: Path) -> list[Path]:
+    if path.is_dir():
+        inside = [p for p in path.iterdir() if p.suffix.lower() == ".mcap" and p.is_file()]
+        if not inside:
+            raise LogError(f"The folder {path} holds no .mcap file; give a recording or a folder with one.")
+        return inside
+    if not path.exists():
+        raise LogError(f"There is no file {path}; give the path of an MCAP recording.")
+    return [path]
+
+
+def _natural(path: Path) -> tuple[list[tuple[int, str]], str]:
+    parts = re.findall(r"\d+|\D+", path.name)
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], str(path)
+
+
+class Store:
+    """Payloads by reference, from a bounded cache of decompressed chunks; safe from several threads.
+
+    Going through a log in order decompresses each chunk once, and a channel that is logged late costs no more than a
+    chunk of its own in the cache.
+
+    Args:
+        files: of the log.
+        chunks: place in the log -> chunk; a place that is not among them is that of a message in no chunk.
+        cache_bytes: the most that decompressed chunks may take (the newest chunk is always kept).
+    """
+
+    def __init__(self, files: Sequence[File], chunks: dict[int, Chunk], cache_bytes: int = CACHE_BYTES) -> None:
+        self._files, self._chunks, self._limit = files, chunks, cache_bytes
+        self._handles: dict[Path, BinaryIO] = {}
+        self._cache: OrderedDict[int, bytes] = OrderedDict()
+        self._held = 0
+        self._closed = False
+        self._lock = threading.Lock()
+        self.decompressed = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the files and forget the cache; nothing can be read afterwards."""
+        with self._lock:
+            self._closed = True
+            for handle in self._handles.values():
+                handle.close()
+            self._handles.clear()
+            self._cache.clear()
+            self._held = 0
+
+    @property
+    def held_bytes(self) -> int:
+        """Bytes of decompressed chunks in the cache."""
+        return self._held
+
+    def payload(self, place: int, offset: int, length: int) -> memoryview:
+        """The payload of one message, as a view that keeps its chunk alive.
+
+        Raises:
+            LogError: the file is no longer what it was when it was scanned.
+        """
+        with self._lock:
+            chunk = self._chunks.get(place)
+            if chunk is None:
+                return memoryview(self._read(place, offset - place, length))
+            records = self._cache.get(place)
+            if records is None:
+                records = self._load(place, chunk)
+            self._cache.move_to_end(place)
+        return memoryview(records)[offset : offset + length]
+
+    def _load(self, place: int, chunk: Chunk) -> bytes:
+        data = self._read(place, chunk.start, chunk.length)
+        try:
+            records = decompress(chunk, data)
+        except BrokenChunkError as err:
+            raise self._changed(place) from err
+        self.decompressed += 1
+        while self._cache and self._held + len(records) > self._limit:
+            _, oldest = self._cache.popitem(last=False)
+            self._held -= len(oldest)
+        self._cache[place] = records
+        self._held += len(records)
+        return records
+
+    def _read(self, place: int, behind: int, length: int) -> bytes:
+        """`length` bytes of the log from `behind` bytes after `place`."""
+        file = self._file(place)
+        if self._closed:
+            raise LogError(f"{file.path} was closed; open the log again to read from it.")
+        handle = self._handles.get(file.path)
+        if handle is None:
+            handle = self._handles[file.path] = open_file(file.path)
+        handle.seek(place - file.base + behind)
+        data = handle.read(length)
+        if len(data) != length:
+            raise self._changed(place)
+        return data
+
+    def _file(self, place: int) -> File:
+        return next(file for file in reversed(self._files) if place >= file.base)
+
+    def _changed(self, place: int) -> LogError:
+        return LogError(f"{self._file(place).path} changed while it was being read; run again on a file at rest.")

@@ -1,0 +1,76 @@
+"""What a log is, in plain words and numbers."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from stsem.log.damage import Damage
+
+
+@dataclass(frozen=True)
+class ChannelInfo:
+    """One channel.
+
+    Args:
+        topic, schema, encoding: as in the file; `encoding` is that of the messages.
+        count: messages that could be counted.
+        rate_hz: (count - 1) / (last - first log time); None below two messages.
+        first_log_ns, last_log_ns: smallest and largest log time; None without a message.
+        offset_min_ns, offset_median_ns: of (log time - stamp); None where stsem reads no stamp.
+        largest_gap_s: between the log times of two messages in a row; None below two messages.
+        role: "color", "depth", "pose", "labels", "calibration", "tf", "tf_static", "classes", or "" when unused.
+    """
+
+    topic: str
+    schema: str
+    encoding: str
+    count: int
+    rate_hz: float | None
+    first_log_ns: int | None
+    last_log_ns: int | None
+    offset_min_ns: int | None
+    offset_median_ns: int | None
+    largest_gap_s: float | None
+    role: str
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The topics that are used as what; None where there is none."""
+
+    color: str | None
+    depth: str | None
+    pose: str | None
+    labels: str | None
+    calibration: str | None
+
+
+@dataclass(frozen=True)
+class LogInfo:
+    """A log as a whole.
+
+    Args:
+        name: of the file or folder, without extension.
+        paths: of its files, in order.
+        sha256: of all bytes of all files, in order; for one file the file's own.
+        size_bytes: of all files.
+        duration_s: from the first to the last colour stamp of the whole log.
+        channels: in order of topic.
+        choice: what is used as what.
+        damage: counts; grows when a frame turns out to be undecodable.
+        warnings: one sentence each.
+        clock_offsets_ns: topic -> offset that was taken out of its log times (below 0 or above 1 s).
+        library, profile: as the recorder named them.
+    """
+
+    name: str
+    paths: tuple[Path, ...]
+    sha256: str
+    size_bytes: int
+    duration_s: float
+    channels: tuple[ChannelInfo, ...]
+    choice: Choice
+    damage: Damage
+    warnings: tuple[str, ...]
+    clock_offsets_ns: dict[str, int]
+    library: str
+    profile: str

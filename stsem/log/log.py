@@ -1,0 +1,249 @@
+"""A recorded log, opened: what it is, how its frames are made, and random access to frames and truth."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TypeVar
+
+import numpy as np
+
+from stsem.camera import Camera
+from stsem.classes import ClassSet, Labels
+from stsem.errors import DecodeError
+from stsem.frame import Depth, Frame, Image
+from stsem.log import pixels
+from stsem.log.assemble import Assembly, assemble
+from stsem.log.classtable import Translator
+from stsem.log.describe import describe
+from stsem.log.files import Store, find_files
+from stsem.log.info import LogInfo
+from stsem.log.pixels import ImageMessage
+from stsem.log.plan import (
+    UNKNOWN_PERIOD_NS,
+    FramePlan,
+    Partners,
+    make_plans,
+    median_period_ns,
+    pair_depth,
+    pair_truth,
+    window,
+)
+from stsem.log.prefetch import AHEAD, Recent, prefetched
+from stsem.log.scan import scan
+from stsem.pose import Trajectory
+
+IMAGES_KEPT = AHEAD + 4
+A = TypeVar("A", Image, Depth)
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A frame as `Log.frames` gives it.
+
+    Args:
+        index: position among the colour frames of the window.
+        frame: None when its colour image cannot be decoded.
+        error: why it cannot.
+        truth: (H, W) uint8 labels in the ids of `Log.classes`; None when not asked for or not there.
+    """
+
+    index: int
+    frame: Frame | None
+    error: DecodeError | None
+    truth: Labels | None
+
+
+def open_log(
+    paths: Sequence[Path],
+    *,
+    topics: Mapping[str, str] | None = None,
+    classes_file: Path | None = None,
+    depth_registered: str = "auto",
+    start_s: float | None = None,
+    end_s: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> "Log":
+    """Scan a log once and say how its frames are made.
+
+    Args:
+        paths: files, or folders of files, of one recording.
+        topics: role (color, depth, pose, labels) -> topic, where the choice by schema and name is not wanted.
+        classes_file: class table (JSON or TOML) instead of the log's own.
+        depth_registered: whether depth pixels are colour pixels: yes, no, or auto (same size means yes).
+        start_s, end_s: window in seconds from the first colour stamp, half-open.
+        progress: called with (bytes done, bytes in all) during the scan.
+
+    Raises:
+        LogError: nothing can be read; ChannelError: no or no clear choice of channels; ClassTableError: a class table
+        that cannot be used; UsageError: a role, a window or a value that cannot be.
+    """
+    files = find_files(paths)
+    scanned = scan(files, progress)
+    store = Store(files, scanned.chunks)
+    try:
+        assembly = assemble(scanned, store, topics or {}, classes_file, depth_registered)
+        rows = window(assembly.color.rows.stamp_ns, start_s, end_s)
+        return Log(assembly, describe(paths, scanned, assembly), store, rows)
+    except BaseException:
+        store.close()
+        raise
+
+
+class Log:
+    """An opened log; made by `open_log`. Context manager; safe to be asked from several threads.
+
+    Attributes:
+        classes: of the truth; None without labels or without a class table.
+        camera: intrinsics of the colour images; None when the log has none.
+        trajectory: T_WC at the samples of the pose channel (of a chain of transforms: at the union of their stamps).
+        plans: one per colour frame in the window, in order of index.
+        period_ns: median distance of colour stamps.
+    """
+
+    def __init__(self, assembly: Assembly, info: LogInfo, store: Store, rows: slice) -> None:
+        self._assembly, self._info, self._store, self._first = assembly, info, store, rows.start
+        self._color, self._depth, self._poses = assembly.color, assembly.depth, assembly.poses
+        self._labels = assembly.labels if assembly.table else None
+        self._translate = Translator(assembly.table) if assembly.table else None
+        self._unknown_pixels: dict[int, int] = {}
+        self._images: Recent[int, Image] = Recent(self._decode_image, IMAGES_KEPT)
+        self._partners, inexact = _pair(assembly)
+        self.camera: Camera | None = assembly.camera
+        self.classes: ClassSet | None = assembly.table.classes if assembly.table else None
+        self.trajectory: Trajectory | None = self._poses.trajectory() if self._poses else None
+        self.period_ns: int = median_period_ns(self._color.rows) or UNKNOWN_PERIOD_NS
+        self.plans: tuple[FramePlan, ...] = _plans(assembly, self._partners, rows)
+        if inexact:
+            sentence = (
+                f"{inexact} label images have no colour image of exactly their stamp and went to the nearest one."
+            )
+            self._info = replace(info, warnings=(*info.warnings, sentence))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the files."""
+        self._store.close()
+
+    @property
+    def info(self) -> LogInfo:
+        """What the log is; damage and warnings include what was met while frames and truth were read."""
+        if not self._unknown_pixels:
+            return self._info
+        frames, total = len(self._unknown_pixels), sum(self._unknown_pixels.values())
+        sentence = f"{total} pixels in {frames} label images have an id or colour outside the class table: ignored."
+        return replace(self._info, warnings=(*self._info.warnings, sentence))
+
+    def frame(self, index: int, *, depth: bool, previous: bool) -> Frame:
+        """The frame at `index`; depth and the previous image are left out (None) where not asked for.
+
+        Depth that cannot be decoded is None and counted as damage.
+
+        Raises:
+            DecodeError: the colour image cannot be decoded.
+            LogError: the file changed or was closed.
+        """
+        plan, row = self.plans[index], self._first + index
+        image = self._images.get(row)
+        pose = self._poses.at(plan.stamp_ns) if self._poses else None
+        return Frame(
+            index=index,
+            stamp_ns=plan.stamp_ns,
+            image=image,
+            previous=self._previous(row) if previous else None,
+            depth=self._decode_depth(row) if depth else None,
+            T_WC=pose.T_WC if pose else None,
+            camera=self.camera,
+        )
+
+    def truth(self, index: int) -> Labels | None:
+        """(H, W) uint8 labels in the ids of `classes`, 255 ignore, at their own size; None without truth.
+
+        A label image that cannot be decoded is None and counted as damage.
+        """
+        row = int(self._partners.truth[self._first + index])
+        if row < 0 or self._labels is None or self._translate is None:
+            return None
+        translate = self._translate
+        try:
+            labels, unknown = self._labels.read(row, lambda message: translate(pixels.labels(message)))
+        except DecodeError:
+            return None
+        if unknown:
+            self._unknown_pixels[row] = unknown
+        return labels
+
+    def frames(self, indices: Iterable[int], *, depth: bool, previous: bool, truth: bool) -> Iterator[Loaded]:
+        """The frames at `indices`, in that order, decoded ahead; nothing is left running however the loop ends."""
+
+        def load(index: int) -> Loaded:
+            labels = self.truth(index) if truth else None
+            try:
+                return Loaded(index, self.frame(index, depth=depth, previous=previous), None, labels)
+            except DecodeError as err:
+                return Loaded(index, None, err, labels)
+
+        return prefetched(load, indices)
+
+    def _decode_image(self, row: int) -> Image:
+        def convert(message: ImageMessage) -> Image:
+            return _of_size(pixels.colour(message), self._assembly.size, "the first image")
+
+        return self._color.read(row, convert)
+
+    def _previous(self, row: int) -> Image | None:
+        """The image of the last row before `row` that can be decoded."""
+        for earlier in range(row - 1, -1, -1):
+            try:
+                return self._images.get(earlier)
+            except DecodeError:
+                continue
+        return None
+
+    def _decode_depth(self, row: int) -> Depth | None:
+        partner = int(self._partners.depth[row])
+        if partner < 0 or self._depth is None:
+            return None
+
+        def convert(message: ImageMessage) -> Depth:
+            return _of_size(pixels.depth(message), self._assembly.size, "colour")
+
+        try:
+            return self._depth.read(partner, convert)
+        except DecodeError:
+            return None
+
+
+def _pair(assembly: Assembly) -> tuple[Partners, int]:
+    """(partners of every colour frame of the log, how many label images are not of exactly its stamp)."""
+    color = assembly.color.rows
+    none = np.full(len(color), -1, np.int64)
+    depth = pair_depth(color, assembly.depth.rows) if assembly.depth else none
+    if assembly.labels is None or assembly.table is None:
+        return Partners(depth, none), 0
+    truth, inexact = pair_truth(color, assembly.labels.rows)
+    return Partners(depth, truth), inexact
+
+
+def _plans(assembly: Assembly, partners: Partners, rows: slice) -> tuple[FramePlan, ...]:
+    channels, offset = (assembly.color, assembly.depth, assembly.labels), assembly.clock_offsets_ns
+    topics = [c.topic if c else None for c in channels] + [assembly.pose_topic]
+    color, depth, truth, pose = (offset.get(topic, 0) if topic else 0 for topic in topics)
+    return make_plans(
+        assembly.color.rows, assembly.depth.rows if assembly.depth else None,
+        assembly.labels.rows if assembly.labels else None, partners, assembly.poses, rows,
+        (color, depth, pose, truth),
+    )  # fmt: skip
+
+
+def _of_size(pixels: A, size: tuple[int, int], what: str) -> A:
+    """`pixels` if they are of `size` (width, height); ValueError otherwise."""
+    height, width = pixels.shape[:2]
+    if (width, height) != size:
+        raise ValueError(f"the image is {width}x{height}, but {what} is {size[0]}x{size[1]}")
+    return pixels

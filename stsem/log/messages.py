@@ -1,0 +1,76 @@
+"""Messages after decoding, the same whatever family they came from. Stamps are None where the sensor gave none."""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from stsem.camera import Camera
+
+
+class Kind(Enum):
+    """What a channel's schema holds."""
+
+    IMAGE = auto()
+    COMPRESSED = auto()
+    VIDEO = auto()
+    CALIBRATION = auto()
+    TRANSFORMS = auto()
+    POSE = auto()
+    CLASS_TABLE = auto()
+
+
+@dataclass(frozen=True, eq=False)
+class RawImage:
+    """An uncompressed image; `data` is a view into the chunk and has `step` bytes per row."""
+
+    stamp_ns: int | None
+    frame_id: str
+    width: int
+    height: int
+    encoding: str
+    big_endian: bool
+    step: int
+    data: memoryview
+
+
+@dataclass(frozen=True, eq=False)
+class CompressedImage:
+    """A still image in a file format of its own, as `format` tells or ought to tell."""
+
+    stamp_ns: int | None
+    frame_id: str
+    format: str
+    data: memoryview
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Intrinsics of a camera; `camera` is None when the message says that it is uncalibrated (K all zero)."""
+
+    stamp_ns: int | None
+    frame_id: str
+    camera: Camera | None
+
+
+@dataclass(frozen=True)
+class Transform:
+    """T_parent_child: maps points of `child` into `parent`, metres; quaternion x, y, z, w.
+
+    A pose has the frame of its header as parent and "" as child.
+    """
+
+    stamp_ns: int | None
+    parent: str
+    child: str
+    translation: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class ClassNames:
+    """A class table that came as a message: raw id -> name."""
+
+    stamp_ns: int | None
+    names: dict[int, str]
+
+
+Decoded = RawImage | CompressedImage | Calibration | tuple[Transform, ...] | ClassNames

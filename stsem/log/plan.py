@@ -1,0 +1,159 @@
+"""Which messages make up a frame, and when it arrives: told by stamps and log times, before any pixel is decoded."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stsem.errors import UsageError
+from stsem.log.poses import PoseSource
+from stsem.log.tracks import Int64, References
+
+MAX_DEPTH_OFFSET_NS = 20_000_000
+MAX_CLOCK_OFFSET_NS = 1_000_000_000
+UNKNOWN_PERIOD_NS = 100_000_000
+NEEDS = frozenset({"depth", "pose"})
+
+
+@dataclass(frozen=True)
+class FramePlan:
+    """One colour frame and its partners. Log times are those of the recorder with the channel's clock offset taken out.
+
+    Args:
+        index: position among the colour frames of the window, by (stamp, log time, position in the file), from 0.
+        stamp_ns: capture stamp of the colour image.
+        color_log_ns: its log time.
+        depth_log_ns: of its depth image; None without.
+        pose_log_ns: of the later of the samples that its pose is made of; None without a pose.
+        truth_log_ns: of its label image; None without.
+    """
+
+    index: int
+    stamp_ns: int
+    color_log_ns: int
+    depth_log_ns: int | None
+    pose_log_ns: int | None
+    truth_log_ns: int | None
+
+    def missing(self, needs: frozenset[str]) -> tuple[str, ...]:
+        """Those of `needs` ("depth", "pose") that this frame does not have."""
+        have = {"depth": self.depth_log_ns, "pose": self.pose_log_ns}
+        return tuple(need for need in sorted(needs) if have[need] is None)
+
+    def arrival_ns(self, needs: frozenset[str]) -> int:
+        """Largest log time of the colour image and of what is there of `needs` (DESIGN 3, "Frames and arrival")."""
+        times = {"depth": self.depth_log_ns, "pose": self.pose_log_ns}
+        return max([self.color_log_ns, *(t for need in needs if (t := times[need]) is not None)])
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether there is a label image for this frame."""
+        return self.truth_log_ns is not None
+
+
+@dataclass(frozen=True)
+class Partners:
+    """Row numbers of the partners of each colour frame of the log; -1 for none. (n,) int64 each."""
+
+    depth: Int64
+    truth: Int64
+
+
+def median_period_ns(references: References) -> int | None:
+    """Median distance of the stamps; None below two messages."""
+    return int(np.median(np.diff(references.stamp_ns))) if len(references) > 1 else None
+
+
+def pair_depth(color: References, depth: References) -> Int64:
+    """Row in `depth` for each colour frame: nearest stamp within min(20 ms, half a depth period), used once."""
+    period = median_period_ns(depth)
+    limit = MAX_DEPTH_OFFSET_NS if period is None else min(MAX_DEPTH_OFFSET_NS, period // 2)
+    return pair(color.stamp_ns, depth.stamp_ns, limit)
+
+
+def pair_truth(color: References, truth: References) -> tuple[Int64, int]:
+    """(row in `truth` for each colour frame, how many are not of exactly its stamp).
+
+    Equal stamps meet first; what is left over on both sides meets within half a colour period, each label image once.
+    """
+    partners = pair(color.stamp_ns, truth.stamp_ns, 0)
+    free_color = np.flatnonzero(partners < 0)
+    free_truth = np.setdiff1d(np.arange(len(truth)), partners)
+    limit = (median_period_ns(color) or UNKNOWN_PERIOD_NS) // 2
+    near = pair(color.stamp_ns[free_color], truth.stamp_ns[free_truth], limit)
+    found = near >= 0
+    partners[free_color[found]] = free_truth[near[found]]
+    return partners, int(found.sum())
+
+
+def pair(wanted: Int64, offered: Int64, limit_ns: int) -> Int64:
+    """(n,) row in `offered` for each of `wanted`, both ascending, at most `limit_ns` away; -1 for none.
+
+    The closest pairs meet first (at equal distance the earlier), and each of `offered` is used once.
+    """
+    partners = np.full(len(wanted), -1, np.int64)
+    if not len(offered):
+        return partners
+    right = np.searchsorted(offered, wanted)
+    rows = np.clip(np.stack([right - 1, right, right + 1], axis=1), 0, len(offered) - 1)
+    distance = np.abs(offered[rows] - wanted[:, None])
+    near = np.flatnonzero(distance.ravel() <= limit_ns)
+    owner, rows, distance = near // 3, rows.ravel()[near], distance.ravel()[near]
+    used = np.zeros(len(offered), np.bool_)
+    for k in np.lexsort((rows, owner, distance)):
+        if partners[owner[k]] < 0 and not used[rows[k]]:
+            partners[owner[k]], used[rows[k]] = rows[k], True
+    return partners
+
+
+def clock_offset_ns(references: References) -> int:
+    """Smallest (log time - stamp) if it is below 0 or above 1 s, else 0: what is taken out of the log times."""
+    return out_of_range(int((references.log_ns - references.stamp_ns).min())) if len(references) else 0
+
+
+def out_of_range(offset_ns: int) -> int:
+    """`offset_ns` if it is below 0 or above 1 s, else 0."""
+    return 0 if 0 <= offset_ns <= MAX_CLOCK_OFFSET_NS else offset_ns
+
+
+def window(stamps_ns: Int64, start_s: float | None, end_s: float | None) -> slice:
+    """Rows of `stamps_ns` within [start, end) seconds from the first; poses and depth outside still serve.
+
+    Raises:
+        UsageError: the window is empty.
+    """
+    first = int(stamps_ns[0])
+    low = 0 if start_s is None else int(np.searchsorted(stamps_ns, first + round(start_s * 1e9)))
+    high = len(stamps_ns) if end_s is None else int(np.searchsorted(stamps_ns, first + round(end_s * 1e9)))
+    if low >= high:
+        length = (int(stamps_ns[-1]) - first) / 1e9
+        raise UsageError(
+            f"No colour frame lies between --start {start_s or 0:g} and --end {length if end_s is None else end_s:g}; "
+            f"the log's colour frames go from 0 to {length:.3f} s."
+        )
+    return slice(low, high)
+
+
+def make_plans(
+    color: References, depth: References | None, truth: References | None, partners: Partners,
+    poses: PoseSource | None, rows: slice, offsets: Sequence[int],
+) -> tuple[FramePlan, ...]:  # fmt: skip
+    """Plans of the colour frames `rows`; `offsets` are the clock offsets of colour, depth, pose and labels."""
+    color_offset, depth_offset, pose_offset, truth_offset = offsets
+    plans = []
+    for index, row in enumerate(range(*rows.indices(len(color)))):
+        stamp_ns = int(color.stamp_ns[row])
+        pose = poses.at(stamp_ns) if poses else None
+        plans.append(
+            FramePlan(
+                index, stamp_ns, int(color.log_ns[row]) - color_offset,
+                _log(depth, int(partners.depth[row]), depth_offset),
+                None if pose is None else pose.log_ns - pose_offset,
+                _log(truth, int(partners.truth[row]), truth_offset),
+            )
+        )  # fmt: skip
+    return tuple(plans)
+
+
+def _log(references: References | None, row: int, offset_ns: int) -> int | None:
+    return None if references is None or row < 0 else int(references.log_ns[row]) - offset_ns

@@ -1,0 +1,202 @@
+"""Where the camera was: stamped poses, or a chain of transforms up to the root of the tree.
+
+Everything is interpolated (linear, slerp) between samples at most MAX_GAP_NS apart and never extrapolated; a chain is
+composed of its edges, each looked up at the stamp, as tf2 does it.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import pairwise
+
+import numpy as np
+
+from stsem.log.messages import Transform
+from stsem.log.tracks import Int64, Track
+from stsem.pose import Pose, Trajectory, from_quaternion
+
+MAX_GAP_NS = 150_000_000
+MAX_DEPTH = 100
+STATIC_SUFFIX = "tf_static"
+
+
+@dataclass(frozen=True)
+class Edge:
+    """T_parent_child over time.
+
+    Args:
+        trajectory: its samples; a static edge has one, which holds always.
+        log_ns: (n,) log times of the samples.
+        static: whether it holds always.
+    """
+
+    trajectory: Trajectory
+    log_ns: Int64
+    static: bool = False
+
+
+@dataclass(frozen=True)
+class PoseLookup:
+    """A pose and the log time of the latest message that it needs."""
+
+    T_WC: Pose
+    log_ns: int
+
+
+@dataclass(frozen=True)
+class PoseSource:
+    """The camera's pose as a chain of edges from the world to the camera's optical frame; one edge for stamped poses.
+
+    Args:
+        topic: of the channel that the moving edges come from.
+        frames: names of the frames along the chain, the world first.
+        edges: T_{frames[i]}_{frames[i+1]}.
+        by_chain: whether it is a chain of transforms.
+    """
+
+    topic: str
+    frames: tuple[str, ...]
+    edges: tuple[Edge, ...]
+    by_chain: bool
+
+    def at(self, stamp_ns: int) -> PoseLookup | None:
+        """T_WC at `stamp_ns`; None when an edge has no two samples close enough around it."""
+        poses: list[Pose] = []
+        latest: int | None = None
+        for edge in self.edges:
+            if edge.static:
+                poses.append(edge.trajectory.poses[0])
+                continue
+            sample = edge.trajectory.at(stamp_ns, MAX_GAP_NS)
+            if sample is None:
+                return None
+            poses.append(sample.T_WC)
+            log_ns = int(edge.log_ns[sample.later])
+            latest = log_ns if latest is None else max(latest, log_ns)
+        return None if latest is None else PoseLookup(reduce(np.matmul, poses), latest)
+
+    def stamps_ns(self) -> Int64:
+        """Ascending union of the stamps of the moving edges."""
+        return np.unique(np.concatenate([e.trajectory.stamps_ns for e in self.edges if not e.static]))
+
+    def trajectory(self) -> Trajectory:
+        """T_WC at every stamp of `stamps_ns` at which the whole chain is known."""
+        known = [(int(stamp), found.T_WC) for stamp in self.stamps_ns() if (found := self.at(int(stamp)))]
+        stamps = np.array([stamp for stamp, _ in known], np.int64)
+        return Trajectory(stamps, np.array([pose for _, pose in known], np.float64).reshape(-1, 4, 4))
+
+    def offset_ns(self) -> int:
+        """Smallest (log time - stamp) of the moving edges' samples."""
+        return min(int((e.log_ns - e.trajectory.stamps_ns).min()) for e in self.edges if not e.static)
+
+
+def stamped_poses(track: Track) -> tuple[PoseSource | None, list[str]]:
+    """(source of a channel of poses, warnings); the pose is taken as that of the camera's optical frame."""
+    edge, bad = _edge(track.transforms)
+    warnings = (
+        [f"{bad} poses of {track.topic} are no poses (not finite, or a zero quaternion) and are left out."]
+        if bad
+        else []
+    )
+    if edge is None:
+        return None, warnings
+    return PoseSource(track.topic, (track.transforms[0][0].parent, "camera"), (edge,), by_chain=False), warnings
+
+
+def transform_chain(tracks: Iterable[Track], camera_frame: str) -> tuple[PoseSource | None, list[str]]:
+    """(source by the chain of transforms from the root of the tree to `camera_frame`, warnings).
+
+    Static transforms hold for all times, whenever they were stamped or logged. A frame with several parents keeps the
+    one with the most samples. None when the frame is not in the tree or nothing in its chain moves.
+    """
+    moving, static = _collect(tracks)
+    parents, warnings = _parents(moving, static)
+    frames, loop = _chain(parents, camera_frame.lstrip("/"))
+    if loop:
+        return None, [f"The transforms run in a circle through {camera_frame!r}: poses are not used."]
+    edges: list[Edge] = []
+    for pair in pairwise(frames):
+        edge, bad = _edge(moving[pair]) if pair in moving else _static_edge(static[pair])
+        if bad:
+            warnings.append(f"{bad} transforms {pair[0]} -> {pair[1]} are no transforms and are left out.")
+        if edge is None:
+            return None, warnings
+        edges.append(edge)
+    if all(edge.static for edge in edges):
+        known = ", ".join(sorted(parents)) or "none"
+        return None, [
+            *warnings,
+            f"No transform moves the camera's frame {camera_frame!r} (frames known: {known}): no poses.",
+        ]
+    topic = max((t for t in tracks if not is_static(t)), key=lambda t: t.count).topic
+    return PoseSource(topic, frames, tuple(edges), by_chain=True), warnings
+
+
+def is_static(track: Track) -> bool:
+    """Whether the transforms of a channel hold for all times."""
+    return track.topic.rstrip("/").endswith(STATIC_SUFFIX)
+
+
+Samples = Sequence[tuple[Transform, int]]
+Pair = tuple[str, str]
+
+
+def _collect(
+    tracks: Iterable[Track],
+) -> tuple[dict[Pair, list[tuple[Transform, int]]], dict[Pair, list[tuple[Transform, int]]]]:
+    moving: dict[Pair, list[tuple[Transform, int]]] = defaultdict(list)
+    static: dict[Pair, list[tuple[Transform, int]]] = defaultdict(list)
+    for track in tracks:
+        target = static if is_static(track) else moving
+        for transform, log_ns in track.transforms:
+            target[transform.parent, transform.child].append((transform, log_ns))
+    return moving, static
+
+
+def _parents(
+    moving: dict[Pair, list[tuple[Transform, int]]], static: dict[Pair, list[tuple[Transform, int]]]
+) -> tuple[dict[str, str], list[str]]:
+    votes: dict[str, dict[str, int]] = defaultdict(dict)
+    for (parent, child), samples in (*static.items(), *moving.items()):
+        votes[child][parent] = votes[child].get(parent, 0) + len(samples)
+    parents = {child: max(sorted(given), key=given.__getitem__) for child, given in votes.items()}
+    warnings = [
+        f"The frame {child!r} has several parents ({', '.join(sorted(given))}); {parents[child]!r} is used."
+        for child, given in sorted(votes.items()) if len(given) > 1
+    ]  # fmt: skip
+    return parents, warnings
+
+
+def _chain(parents: dict[str, str], frame: str) -> tuple[tuple[str, ...], bool]:
+    """(frames from the root down to `frame`, whether they run in a circle)."""
+    frames = [frame]
+    while (parent := parents.get(frames[-1])) is not None:
+        if parent in frames or len(frames) > MAX_DEPTH:
+            return tuple(reversed(frames)), True
+        frames.append(parent)
+    return tuple(reversed(frames)), False
+
+
+def _static_edge(samples: Samples) -> tuple[Edge | None, int]:
+    """The last static transform of a pair holds."""
+    edge, bad = _edge(samples[-1:])
+    return (Edge(edge.trajectory, edge.log_ns, static=True) if edge else None), bad
+
+
+def _edge(samples: Samples) -> tuple[Edge | None, int]:
+    """(edge with strictly ascending stamps, samples that are no transforms); of equal stamps the first counts."""
+    good: dict[int, tuple[Pose, int]] = {}
+    bad = 0
+    for transform, log_ns in samples:
+        stamp_ns = log_ns if transform.stamp_ns is None else transform.stamp_ns
+        try:
+            good.setdefault(stamp_ns, (from_quaternion(transform.translation, transform.quaternion), log_ns))
+        except ValueError:
+            bad += 1
+    if not good:
+        return None, bad
+    stamps = sorted(good)
+    poses = np.stack([good[stamp][0] for stamp in stamps])
+    logs = np.array([good[stamp][1] for stamp in stamps], np.int64)
+    return Edge(Trajectory(np.array(stamps, np.int64), poses), logs), bad
