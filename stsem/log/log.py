@@ -131,6 +131,11 @@ class Log:
         self._store.close()
 
     @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of the colour images."""
+        return self._assembly.size
+
+    @property
     def info(self) -> LogInfo:
         """What the log is; damage and warnings include what was met while frames and truth were read."""
         if not self._unknown_pixels:
