@@ -43,7 +43,9 @@ class ClassSet:
                 raise ClassTableError(f"The class names {other!r} and {name!r} are the same name; rename one of them.")
             seen[normalised(name)] = name
         if self.colours and len(self.colours) != len(self.names):
-            raise ClassTableError(f"{len(self.names)} classes came with {len(self.colours)} colours; give one per class.")
+            raise ClassTableError(
+                f"{len(self.names)} classes came with {len(self.colours)} colours; give one per class."
+            )
 
     def __len__(self) -> int:
         return len(self.names)

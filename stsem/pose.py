@@ -39,10 +39,10 @@ def to_quaternion(pose: Pose) -> npt.NDArray[np.float64]:
     if k == 3:
         q[:] = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], 1 + candidates[3]
     else:
-        i, j, l = k, (k + 1) % 3, (k + 2) % 3
-        q[i] = 1 - candidates[3] + 2 * m[i, i]
-        q[j], q[l] = m[j, i] + m[i, j], m[l, i] + m[i, l]
-        q[3] = m[l, j] - m[j, l]
+        i, j = (k + 1) % 3, (k + 2) % 3
+        q[k] = 1 - candidates[3] + 2 * m[k, k]
+        q[i], q[j] = m[i, k] + m[k, i], m[j, k] + m[k, j]
+        q[3] = m[j, i] - m[i, j]
     q /= np.linalg.norm(q)
     return -q if q[3] < 0 else q
 
@@ -93,7 +93,7 @@ class Trajectory:
         return len(self.stamps_ns)
 
     def at(self, stamp_ns: int, max_gap_ns: int) -> PoseSample | None:
-        """Pose at `stamp_ns`, interpolated between samples at most `max_gap_ns` apart; None outside: no extrapolation."""
+        """Pose at `stamp_ns` between samples at most `max_gap_ns` apart; None outside them: no extrapolation."""
         i = int(np.searchsorted(self.stamps_ns, stamp_ns))
         if i < len(self) and self.stamps_ns[i] == stamp_ns:
             return PoseSample(self.poses[i], i)

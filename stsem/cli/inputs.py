@@ -1,0 +1,119 @@
+"""From a finished replay to what the report's views are made from."""
+
+from collections import defaultdict
+from dataclasses import replace
+from pathlib import Path
+
+from stsem.document.schema import Document
+from stsem.log.log import Log
+from stsem.mapping.ply import write_ply
+from stsem.pose import to_quaternion
+from stsem.replay.engine import ModeRun, Replayed
+from stsem.replay.record import Record
+from stsem.replay.runs import Context
+from stsem.report.inputs import FrameRow, ReportInputs, StripFrame
+from stsem.result import FrameResult, Span
+from stsem.sim.trace import RunTrace, marks_of, trace_bytes
+
+MAX_POSE_GAP_NS = 150_000_000
+
+
+def report_inputs(context: Context, document: Document, scratch: Path, *, plots: bool) -> ReportInputs:
+    """What `write_folder` needs; the map is written to `scratch` first."""
+    replayed = context.replayed
+    clocked = any(run.real_time is not None for run in replayed.runs)
+    return ReportInputs(
+        document=document,
+        frames=tuple(row for run in replayed.runs for row in _rows(run, replayed)),
+        strip=_strip(replayed),
+        strip_pass="offline" if any(run.offline is not None for run in replayed.runs) else "delivered",
+        trace=_trace(context) if clocked else None,
+        trajectory=_trajectory(context.log),
+        point_cloud=_map(context, scratch),
+        plots=plots,
+    )
+
+
+def _rows(run: ModeRun, replayed: Replayed) -> list[FrameRow]:
+    record = run.real_time or run.offline
+    if record is None:
+        return []
+    spans: dict[int, list[Span]] = defaultdict(list)
+    for span in run.spans:
+        spans[span.frame].append(span)
+    offline, own, streaming = _accuracies(run.offline), _accuracies(run.real_time), {}
+    if run.real_time is not None and run.real_time.scorecard is not None:
+        streaming = run.real_time.scorecard.streaming_pixel_accuracy()
+    sources = {} if run.offline is None else {r.index: r.keyframe for r in run.offline.results}
+    stamps = {slot.index: slot.log_stamp_ns for slot in replayed.slots}
+    return [
+        FrameRow(
+            mode=run.mode.name,
+            result=replace(result, spans=tuple(spans[result.index])),
+            log_stamp_ns=stamps[result.index],
+            offline_keyframe=sources.get(result.index),
+            offline=offline.get(result.index),
+            delivered=_delivered(own, result),
+            streaming=streaming.get(result.index),
+        )
+        for result in record.results
+    ]
+
+
+def _accuracies(record: Record | None) -> dict[int, float]:
+    return {} if record is None or record.scorecard is None else record.scorecard.pixel_accuracy()
+
+
+def _delivered(own: dict[int, float], result: FrameResult) -> float | None:
+    return own.get(result.index) if result.outcome.is_answer else None
+
+
+def _strip(replayed: Replayed) -> tuple[StripFrame, ...]:
+    strip = []
+    for picture in replayed.pictures:
+        answers, distance = {}, {}
+        for run in replayed.runs:
+            record = run.offline or run.real_time
+            if record is None or picture.index not in record.answers:
+                continue
+            answers[run.mode.name] = record.answers[picture.index]
+            source = next(r.keyframe for r in record.results if r.index == picture.index)
+            if source is not None:
+                distance[run.mode.name] = picture.index - source
+        strip.append(StripFrame(picture.index, picture.image, picture.truth, answers, distance))
+    return tuple(strip)
+
+
+def _trace(context: Context) -> bytes:
+    stamps = {slot.index: slot.log_stamp_ns for slot in context.replayed.slots}
+    return trace_bytes(
+        [
+            RunTrace(run.mode.name, context.config.cores, stamps, run.spans, marks_of(run.real_time.results))
+            for run in context.replayed.runs
+            if run.real_time is not None
+        ]
+    )
+
+
+def _trajectory(log: Log) -> bytes | None:
+    """Camera poses at the colour stamps, TUM format: stamp in seconds, position, quaternion x y z w."""
+    if log.trajectory is None:
+        return None
+    lines = ["# timestamp tx ty tz qx qy qz qw"]
+    for plan in log.plans:
+        sample = log.trajectory.at(plan.stamp_ns, MAX_POSE_GAP_NS)
+        if sample is not None:
+            numbers = [*sample.T_WC[:3, 3], *to_quaternion(sample.T_WC)]
+            seconds, rest = divmod(plan.stamp_ns, 10**9)
+            lines.append(f"{seconds}.{rest:09d} " + " ".join(f"{number:.9g}" for number in numbers))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _map(context: Context, scratch: Path) -> Path | None:
+    """map.ply of the last mode that built a map: `keyframe`, if it ran."""
+    clouds = [run.cloud for run in context.replayed.runs if run.cloud is not None]
+    if not clouds or context.model.classes is None:
+        return None
+    path = scratch / "map.ply"
+    write_ply(path, clouds[-1].points, context.model.classes)
+    return path

@@ -1,0 +1,52 @@
+"""Where errors become exit codes, once for every verb."""
+
+import functools
+import os
+import sys
+from collections.abc import Callable
+from typing import ParamSpec
+
+import typer
+
+from stsem.errors import EXIT_ERROR, EXIT_FINE, StsemError
+
+P = ParamSpec("P")
+
+
+def verb(function: Callable[P, int | None]) -> Callable[P, None]:
+    """A command whose errors are one sentence on stderr and whose return value is its exit code.
+
+    With STSEM_DEBUG=1 the traceback is shown instead.
+    """
+
+    @functools.wraps(function)
+    def guarded(*args: P.args, **kwargs: P.kwargs) -> None:
+        raise typer.Exit(_run(lambda: function(*args, **kwargs)))
+
+    return guarded
+
+
+def _run(body: Callable[[], int | None]) -> int:
+    if os.environ.get("STSEM_DEBUG") == "1":
+        return body() or EXIT_FINE
+    try:
+        return body() or EXIT_FINE
+    except StsemError as err:
+        return _say(str(err), err.exit_code)
+    except KeyboardInterrupt:
+        return _say("Interrupted; no half-written report is left behind.", EXIT_ERROR)
+    except BrokenPipeError:
+        sys.stderr.close()
+        return EXIT_ERROR
+    except (typer.Exit, typer.Abort):
+        raise
+    except MemoryError:
+        return _say("The memory of this machine is used up; close other programs or take a smaller window.", EXIT_ERROR)
+    except Exception as err:  # noqa: BLE001 - the last line of defence: a bug is told in one sentence, too
+        what = f"{type(err).__name__}: {err}".replace("\n", " ")
+        return _say(f"This is a defect of stsem, please report it with STSEM_DEBUG=1: {what}.", EXIT_ERROR)
+
+
+def _say(text: str, code: int) -> int:
+    print(f"stsem: {text}", file=sys.stderr)
+    return code

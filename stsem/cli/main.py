@@ -1,0 +1,49 @@
+"""The two commands: `stsem VERB ...`, and `stsem-replay` as a short name for `stsem replay`."""
+
+from typing import Annotated
+
+import typer
+
+from stsem import __version__
+from stsem.cli import cache, costs, gate, inspect, replay, synth
+
+_SETTINGS = {"help_option_names": ["-h", "--help"]}
+
+app = typer.Typer(
+    name="stsem",
+    help="How accurate, how late and how fast a semantic scene-mapping pipeline is on your recorded logs.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings=_SETTINGS,
+)
+app.command("replay", help=replay.HELP)(replay.replay)
+app.command("inspect", help=inspect.HELP)(inspect.inspect)
+app.command("gate", help=gate.HELP)(gate.gate)
+app.command("synth", help=synth.HELP)(synth.synth)
+app.add_typer(costs.app, name="costs")
+app.add_typer(cache.app, name="cache")
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"stsem {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _stsem(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show it.")] = False,
+) -> None:
+    pass
+
+
+def stsem() -> None:
+    """Entry point of `stsem`."""
+    app()
+
+
+def stsem_replay() -> None:
+    """Entry point of `stsem-replay`."""
+    single = typer.Typer(pretty_exceptions_enable=False, context_settings=_SETTINGS)
+    single.command("stsem-replay", help=replay.HELP)(replay.replay)
+    single()

@@ -1,0 +1,133 @@
+"""The straight line of `stsem replay`: open, build, replay, document, write, print."""
+
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from stsem import hostclock
+from stsem.cli.console import note, progress
+from stsem.cli.inputs import report_inputs
+from stsem.document.canonical import to_bytes
+from stsem.document.difference import first_differences, repeatable_files
+from stsem.document.origin import Host
+from stsem.document.schema import Document
+from stsem.errors import NotRepeatableError
+from stsem.log.log import Log, open_log
+from stsem.replay.build import Model, build_model
+from stsem.replay.config import RunConfig
+from stsem.replay.costing import Costing, costing
+from stsem.replay.documents import build_document
+from stsem.replay.engine import can_map, replay_log
+from stsem.replay.runs import Context
+from stsem.report.folder import check_target, folder_name, write_folder
+from stsem.report.terminal import closing_table
+
+REPORTS = Path("reports")
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """One log, opened, with everything that replays of it share."""
+
+    log: Log
+    config: RunConfig
+    model: Model
+    costing: Costing | None
+    fused: bool
+
+
+def replay_all(recordings: Sequence[tuple[Path, ...]], config: RunConfig) -> int:
+    """Replay each recording into a report of its own; returns the largest exit code."""
+    codes = []
+    for paths in recordings:
+        out = config.out
+        if out is not None and len(recordings) > 1:
+            out = out / paths[0].stem
+        codes.append(_replay_one(paths, config, out))
+    return max(codes)
+
+
+def _replay_one(paths: tuple[Path, ...], config: RunConfig, out: Path | None) -> int:
+    began = hostclock.wall_ns()
+    if out is not None:
+        check_target(out)
+    with progress(f"Reading {paths[0].name}") as step:
+        log = open_log(
+            paths,
+            topics={str(role): topic for role, topic in config.topic.items()},
+            classes_file=config.classes, depth_registered=config.depth_registered,
+            start_s=config.start, end_s=config.end, progress=step,
+        )  # fmt: skip
+    with log:
+        session = _session(log, config)
+        document, folder = _write(session, out, began)
+        for number in range(2, config.repeat + 1):
+            _check_repeats(session, folder, number)
+    _print(document, folder, config)
+    return document.verdict.exit_code
+
+
+def _session(log: Log, config: RunConfig) -> Session:
+    model = build_model(log, config)
+    fused = can_map(log, config)
+    clocked = config.clock == "real-time"
+    costs = costing(log, config, model, fused=fused, say=note) if clocked else None
+    return Session(log, config, model, costs, fused)
+
+
+def _replay(session: Session, began_ns: int, label: str) -> Context:
+    log, config, model, costs = session.log, session.config, session.model, session.costing
+    with progress(label) as step:
+        replayed = replay_log(log, config, model, None if costs is None else costs.of, step)
+    return Context(log, config, model, costs, replayed)
+
+
+def _write(session: Session, out: Path | None, began_ns: int) -> tuple[Document, Path]:
+    context = _replay(session, began_ns, f"Replaying {session.log.info.name}")
+    document = build_document(context, _host(session, began_ns))
+    folder = out or REPORTS / session.log.info.name / folder_name(document)
+    with tempfile.TemporaryDirectory(prefix="stsem-") as scratch:
+        inputs = report_inputs(context, document, Path(scratch), plots=session.config.plots)
+        return document, write_folder(inputs, folder)
+
+
+def _check_repeats(session: Session, first: Path, number: int) -> None:
+    """Replay once more and compare every file that must have the same bytes.
+
+    Raises:
+        NotRepeatableError: they differ; the first field and frame are named.
+    """
+    with tempfile.TemporaryDirectory(prefix="stsem-") as scratch:
+        _, again = _write(session, Path(scratch) / "again", hostclock.wall_ns())
+        found = first_differences(repeatable_files(first), repeatable_files(again))
+    if found:
+        where = "; ".join(map(str, found[:3]))
+        raise NotRepeatableError(f"Replay {number} differs from the first ({first}): {where}.")
+
+
+def _host(session: Session, began_ns: int) -> Host:
+    return Host(
+        paths={"log": ", ".join(map(str, session.log.info.paths)), "model": session.config.model,
+               "costs": session.config.costs},
+        command=" ".join(sys.argv),
+        machine=hostclock.machine_facts(),
+        started_at=hostclock.utc_now(),
+        wall_s=(hostclock.wall_ns() - began_ns) / 1e9,
+        cpu_s=hostclock.process_cpu_ns() / 1e9,
+        peak_memory_bytes=hostclock.peak_memory_bytes(),
+    )  # fmt: skip
+
+
+def _print(document: Document, folder: Path, config: RunConfig) -> None:
+    if config.json_:
+        sys.stdout.write(to_bytes(document).decode())
+    else:
+        print(f"{closing_table(document)}\n\n{document.verdict.text}")
+    if document.state == "lossy":
+        note(" ".join(document.state_reasons))
+    for warning in document.warnings:
+        note(f"Note: {warning}")
+    shown = folder if folder.is_absolute() else Path(*folder.parts)
+    (note if config.json_ else print)(f"Report: {shown / 'report.html'}")

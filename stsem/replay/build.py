@@ -1,0 +1,134 @@
+"""From a configuration and a log to the objects of a run. The only place where stages get their numbers."""
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from stsem.classes import NO_LABEL, ClassSet, Labels, translation
+from stsem.errors import ClassTableError
+from stsem.inference.cache import CachedInferencer, OutputCache, cache_root
+from stsem.inference.inferencer import Inferencer
+from stsem.inference.network import Network, load_network
+from stsem.log.log import Log
+from stsem.replay.answer import AnswerRule, Prediction
+from stsem.replay.config import RunConfig
+from stsem.replay.memo import Memo
+from stsem.replay.modes import Mode
+from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.register import Register
+from stsem.stages.segment import NetworkSegmenter, OracleSegmenter, Segmenter
+from stsem.stages.select import parse_policy
+
+NETWORK_THREADS = 2
+"""Threads of the network outside `--costs measured`; its output does not depend on them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What segments keyframes, and in which classes.
+
+    Args:
+        name: as given, files without their folder.
+        network: None for the oracle.
+        classes: of every label image in the run: the log's, or the network's when the log's cannot be used.
+        translation: (256,) from the network's ids to `classes`; None for the oracle.
+        reason: why accuracy cannot be measured; "" when it can.
+        segmenter: makes the segmenter for a number of threads.
+    """
+
+    name: str
+    network: Network | None
+    classes: ClassSet | None
+    translation: Labels | None
+    reason: str
+    segmenter: Callable[[int], Segmenter]
+
+
+def build_model(log: Log, config: RunConfig) -> Model:
+    """The network or the oracle, and how its classes meet those of the log.
+
+    Raises:
+        NetworkError: the network cannot be used.
+        ClassTableError: the oracle without truth, or a class map that names unknown classes.
+    """
+    if config.is_oracle:
+        return _oracle(log)
+    network = load_network(config.model)
+    classes, table, reason = _meeting(network.classes, log, config)
+    make = partial(_network_segmenter, network, table, log, config)
+    return Model(Path(config.model).name, network, classes, table, reason, make)
+
+
+def build_rule(mode: Mode, segmenter: Segmenter, config: RunConfig) -> AnswerRule:
+    """The steps of `mode`, with a memory of their own."""
+    if mode.segments_every_frame:
+        return AnswerRule(segmenter, None)
+    policy = parse_policy(
+        config.keyframes, rotation=config.keyframe_rotation, translation=config.keyframe_translation,
+        time_ns=round(config.keyframe_time_s * 1e9),
+    )  # fmt: skip
+    method = PROPAGATIONS[config.propagation]()
+    needed = policy.needs_homography or method.needs_homography
+    return AnswerRule(segmenter, Prediction(policy, method, Register(config.seed) if needed else None))
+
+
+def truth_frames(log: Log) -> frozenset[int]:
+    """Log indices of the frames that carry truth."""
+    return frozenset(plan.index for plan in log.plans if plan.has_truth)
+
+
+def _oracle(log: Log) -> Model:
+    if log.classes is None or not truth_frames(log):
+        raise ClassTableError(
+            f"The oracle needs truth, but {log.info.name} has "
+            f"{'no label channel' if log.info.choice.labels is None else 'no class table or no labelled frame'}; "
+            "choose a network with --model."
+        )
+    segmenter = OracleSegmenter(truth_frames(log).__contains__, log.truth)
+    return Model("oracle", None, log.classes, None, "", lambda threads: Memo(segmenter))
+
+
+def _meeting(network: ClassSet, log: Log, config: RunConfig) -> tuple[ClassSet, Labels, str]:
+    """(classes of the run, translation into them, why accuracy cannot be measured)."""
+    own: Labels = np.arange(256, dtype=np.uint8)
+    if log.info.choice.labels is None:
+        return network, own, "the log has no label channel"
+    if log.classes is None:
+        return network, own, "the labels of the log have no class table; give one with --classes"
+    if not truth_frames(log):
+        return network, own, "no frame in the window has truth"
+    table = translation(network, log.classes, _class_map(config.class_map))
+    if (table[: len(network)] == NO_LABEL).all():
+        return network, own, (
+            f"the network ({', '.join(network.names)}) and the log ({', '.join(log.classes.names)}) have no class in "
+            "common; say which are the same with --class-map"
+        )  # fmt: skip
+    return log.classes, table, ""
+
+
+def _class_map(path: Path | None) -> dict[str, str]:
+    if path is None:
+        return {}
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as err:
+        raise ClassTableError(f"The class map {path} cannot be read: {err.strerror or err}.") from err
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
+        raise ClassTableError(f"The class map {path} is not valid TOML: {err}.") from err
+    if bad := [key for key, value in table.items() if not isinstance(value, str)]:
+        raise ClassTableError(f'The class map {path} gives no class name for {bad[0]!r}; write it as name = "name".')
+    return table
+
+
+def _network_segmenter(network: Network, table: Labels, log: Log, config: RunConfig, threads: int) -> Segmenter:
+    inferencer = Inferencer(network, backend=config.backend, precision=config.precision, threads=threads)
+    if config.costs == "measured":
+        return NetworkSegmenter(inferencer, table)
+    if not config.cache:
+        return Memo(NetworkSegmenter(inferencer, table))
+    cache = OutputCache(cache_root(), log.info.sha256, inferencer.identity)
+    return Memo(NetworkSegmenter(CachedInferencer(inferencer, cache), table))

@@ -1,0 +1,120 @@
+"""Which cost source a configuration asks for."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from stsem import hostclock
+from stsem.errors import CostError, UsageError
+from stsem.frame import Frame
+from stsem.inference.cache import cache_root
+from stsem.inference.network import DEFAULT, Network, load_network
+from stsem.log.log import Log
+from stsem.replay.build import Model
+from stsem.replay.calibrate import Subject, measure
+from stsem.replay.config import RunConfig
+from stsem.replay.modes import Mode
+from stsem.sim.costs import CostSource, MeasuredCosts, ProfileCosts, TraceCosts
+from stsem.sim.profile import CostProfile, load_profile
+from stsem.sim.trace import is_trace, read_durations
+from stsem.stages.propagate import PROPAGATIONS
+
+_CALIBRATION_FRAMES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Costing:
+    """Where durations come from.
+
+    Args:
+        name: for the report.
+        of: the source of a mode.
+        sha256: of the profile or trace; None when durations are measured as they happen.
+        profile: the profile, if it is one.
+    """
+
+    name: str
+    of: Callable[[Mode], CostSource]
+    sha256: str | None
+    profile: CostProfile | None
+
+
+def costing(log: Log, config: RunConfig, model: Model, *, fused: bool, say: Callable[[str], None]) -> Costing:
+    """The cost source for `config`.
+
+    Args:
+        log, config, model: of the run.
+        fused: whether frames are decoded with depth.
+        say: told what takes time.
+
+    Raises:
+        CostError: a profile or trace that cannot be used.
+    """
+    if config.costs == "measured":
+        if config.count_decode:
+            raise UsageError("--count-decode needs a cost profile; give --costs auto or a file instead of measured.")
+        return Costing("measured", lambda mode: MeasuredCosts(hostclock.wall_ns), None, None)
+    if config.costs == "auto":
+        return _of_profile("auto", _calibrated(log, config, model, fused, say), log, config)
+    path = Path(config.costs)
+    try:
+        data = path.read_bytes()
+    except OSError as err:
+        raise CostError(f"The costs {path} cannot be read: {err.strerror or err}; give a profile or a trace.") from err
+    if is_trace(data):
+        durations, sha256 = read_durations(path)
+        return Costing(path.name, lambda mode: TraceCosts(durations, mode.name, sha256), sha256, None)
+    return _of_profile(path.name, load_profile(path), log, config)
+
+
+def _of_profile(name: str, profile: CostProfile, log: Log, config: RunConfig) -> Costing:
+    source = ProfileCosts(profile, config.seed, log.info.sha256)
+    return Costing(name, lambda mode: source, profile.sha256, profile)
+
+
+def subject(config: RunConfig, model: Model, cores: tuple[int, ...]) -> Subject:
+    """What a profile for this configuration must hold; `cores`: how many the network may claim."""
+    network: Network = model.network or load_network(DEFAULT)
+    return Subject(
+        network, config.backend, config.precision, cores, PROPAGATIONS[config.propagation](), config.seed
+    )  # fmt: skip
+
+
+def calibration_frames(log: Log, *, fused: bool) -> list[Frame]:
+    """The first decodable frames of the log.
+
+    Raises:
+        CostError: fewer than two frames can be decoded.
+    """
+    found = []
+    for loaded in log.frames([plan.index for plan in log.plans], depth=fused, previous=True, truth=False):
+        if loaded.frame is not None:
+            found.append(loaded.frame)
+        if len(found) == _CALIBRATION_FRAMES:
+            break
+    if len(found) < 2:
+        raise CostError("Costs cannot be measured on fewer than two decodable frames; give a profile with --costs.")
+    return found
+
+
+def _calibrated(log: Log, config: RunConfig, model: Model, fused: bool, say: Callable[[str], None]) -> CostProfile:
+    cores = tuple(sorted({min(mode.network_cores, config.cores) for mode in config.modes}))
+    wanted = subject(config, model, cores)
+    frames = calibration_frames(log, fused=fused)
+    about = {
+        "machine": hostclock.machine_name(), "network": wanted.network.sha256, "size": frames[0].size,
+        "backend": [wanted.backend, wanted.precision], "cores": wanted.network_cores,
+        "propagation": config.propagation, "fused": fused,
+    }  # fmt: skip
+    digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:16]
+    path = cache_root() / "costs" / f"{digest}.json"
+    if config.cache and path.is_file():
+        return load_profile(path)
+    say("Measuring what the stages cost on this machine (once; kept in the cache folder) ...")
+    profile = measure(wanted, frames)
+    if config.cache:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        profile.save(path)
+    return profile

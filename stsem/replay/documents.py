@@ -1,0 +1,155 @@
+"""The report of one replay: state, verdict, identity, input, runs, comparison."""
+
+import importlib.metadata
+import platform
+
+from stsem import __version__
+from stsem.document.canonical import sealed
+from stsem.document.origin import Channel, Host, Identity, Input, LogInput
+from stsem.document.schema import Document, State, Verdict
+from stsem.errors import EXIT_FINE, EXIT_LOSSY, EXIT_NOTHING_MEASURED
+from stsem.inference.cpu import cpu_features
+from stsem.log.log import Log
+from stsem.replay.comparison import Contender, compare
+from stsem.replay.runs import Context, Found, part, scored
+
+_PACKAGES = ("mcap", "numpy", "onnxruntime", "opencv-python-headless", "scipy")
+
+
+def build_document(context: Context, host: Host) -> Document:
+    """The sealed document of a finished replay.
+
+    Args:
+        context: the log, the configuration and what came of it.
+        host: what differs from run to run.
+    """
+    found = [scored(run) for run in context.replayed.runs]
+    base = next((f for f in found if f.run.mode.segments_every_frame), None)
+    measured, reason = _accuracy_state(context, found)
+    state, reasons = _state(context, measured)
+    parts = tuple(part(context, f, base) for f in found)
+    contenders = [Contender(p, f.run.real_time, f.run.offline) for p, f in zip(parts, found, strict=True)]
+    comparisons = compare(contenders, context.config.seed)
+    return sealed(
+        Document(
+            state=state,
+            state_reasons=reasons,
+            accuracy_state="measured" if measured else "not measured",
+            accuracy_reason=reason,
+            verdict=_verdict(context, state, measured, reason),
+            identity=_identity(context),
+            input=_input(context, found),
+            config=context.config.reported(),
+            runs=parts,
+            comparison=comparisons[0] if comparisons else None,
+            more_comparisons=comparisons[1:],
+            warnings=_warnings(context),
+            host=host,
+        )
+    )
+
+
+def _accuracy_state(context: Context, found: list[Found]) -> tuple[bool, str]:
+    if context.model.reason:
+        return False, context.model.reason
+    scores = [accuracy for f in found for accuracy in (f.offline, f.clocked) if accuracy is not None]
+    if any(accuracy.measured for accuracy in scores):
+        return True, ""
+    return False, next((accuracy.reason for accuracy in scores), "no pass with truth ran")
+
+
+def _state(context: Context, measured: bool) -> tuple[State, tuple[str, ...]]:
+    timed = any(
+        r.answered_ns is not None for run in context.replayed.runs if run.real_time for r in run.real_time.results
+    )
+    if not measured and not timed:
+        return "invalid", ("Neither accuracy nor timing could be measured.",)
+    damage = context.log.info.damage
+    return ("lossy", (f"The log is damaged: {damage}.",)) if damage.lossy else ("valid", ())
+
+
+def _verdict(context: Context, state: str, measured: bool, reason: str) -> Verdict:
+    frames = len(context.replayed.slots)
+    if state == "invalid":
+        return Verdict(exit_code=EXIT_NOTHING_MEASURED, text=f"Nothing was measured: {reason}.")
+    with_truth = sum(slot.has_truth for slot in context.replayed.slots)
+    accuracy = f"accuracy measured on {with_truth}" if measured else f"accuracy not measured: {reason}"
+    if state == "lossy":
+        return Verdict(exit_code=EXIT_LOSSY, text=f"Finished with a damaged log: {frames} frames, {accuracy}.")
+    return Verdict(exit_code=EXIT_FINE, text=f"Finished: {frames} frames, {accuracy}.")
+
+
+def _identity(context: Context) -> Identity:
+    network, costing, config = context.model.network, context.costing, context.config
+    versions = {name: importlib.metadata.version(name) for name in _PACKAGES}
+    return Identity(
+        backend=config.backend if network else "oracle",
+        precision=config.precision if network else "",
+        versions={"stsem": __version__, "python": platform.python_version(), **versions},
+        cpu_features=cpu_features(),
+        model=context.model.name,
+        model_sha256=network.model_sha256 if network else None,
+        sidecar_sha256=network.sidecar_sha256 if network else None,
+        costs="" if costing is None else costing.name,
+        costs_sha256=None if costing is None else costing.sha256,
+        costs_disturbed=costing is not None and costing.profile is not None and costing.profile.disturbed,
+    )
+
+
+def _input(context: Context, found: list[Found]) -> Input:
+    classes = context.model.classes
+    scores = [accuracy for f in found for accuracy in (f.offline, f.clocked) if accuracy is not None]
+    return Input(
+        logs=(_log_input(context),),
+        classes=() if classes is None else classes.names,
+        colours=() if classes is None else classes.colours,
+        classes_unknown_to_network=scores[0].unknown if scores else (),
+    )
+
+
+def _log_input(context: Context) -> LogInput:
+    log, config, slots = context.log, context.config, context.replayed.slots
+    pictures = context.replayed.pictures
+    truth = next((p.truth for p in pictures if p.truth is not None), None)
+    return LogInput(
+        name=log.info.name,
+        sha256=log.info.sha256,
+        frames=len(slots),
+        frames_with_truth=sum(slot.has_truth for slot in slots),
+        duration_s=log.info.duration_s,
+        damage=log.info.damage.as_dict(),
+        period_ms=log.period_ns / 1e6,
+        size=pictures[0].image.shape[1::-1] if pictures else None,
+        truth_size=None if truth is None else truth.shape[::-1],
+        channels=_channels(log),
+        window_s=None if config.start is None and config.end is None else (config.start, config.end),
+    )
+
+
+def _channels(log: Log) -> dict[str, Channel]:
+    choice, by_topic = log.info.choice, {channel.topic: channel for channel in log.info.channels}
+    chosen = {
+        "color": choice.color, "depth": choice.depth, "pose": choice.pose, "labels": choice.labels,
+        "camera": choice.calibration,
+    }  # fmt: skip
+    table = {}
+    for role, topic in chosen.items():
+        if topic is not None and topic in by_topic:
+            channel = by_topic[topic]
+            offset = channel.offset_min_ns
+            table[role] = Channel(
+                topic=topic, messages=channel.count, schema_name=channel.schema,
+                offset_ms=None if offset is None else offset / 1e6,
+                offset_removed=topic in log.info.clock_offsets_ns,
+            )  # fmt: skip
+    return table
+
+
+def _warnings(context: Context) -> tuple[str, ...]:
+    found = list(context.log.info.warnings)
+    costing = context.costing
+    if costing is not None and costing.profile is not None and costing.profile.disturbed:
+        found.append("The cost profile was measured while other work held a core; its durations are too long.")
+    if context.config.costs == "measured" and context.config.clock == "real-time":
+        found.append("Durations were measured as they happened on this machine: timing does not repeat.")
+    return tuple(found)

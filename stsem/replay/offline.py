@@ -1,0 +1,70 @@
+"""One mode without a clock: every frame in order, which is what papers measure (DESIGN 3, `--clock offline`)."""
+
+from stsem.classes import Labels
+from stsem.frame import Frame, Segmentation
+from stsem.log.log import Loaded
+from stsem.replay.answer import AnswerRule
+from stsem.replay.realtime import Judge
+from stsem.replay.schedule import Slot
+from stsem.result import FrameResult, Outcome
+from stsem.stages.fuse import Fuse
+
+
+class OfflineRun:
+    """Answers each frame when it is pushed.
+
+    Args:
+        slots: every frame of the log, in log order.
+        rule: how the mode answers.
+        judge: told of every end (never of arrivals: there is no clock).
+        fuse: the map; None without one.
+        only_truth: skip frames without truth where no later frame depends on them (`per-frame`); they have no outcome.
+    """
+
+    def __init__(
+        self, slots: tuple[Slot, ...], rule: AnswerRule, judge: Judge, *, fuse: Fuse | None, only_truth: bool
+    ) -> None:
+        self._slots, self._rule, self._judge, self._fuse = slots, rule, judge, fuse
+        self._only_truth = only_truth
+        self._pushed = 0
+
+    def push(self, loaded: Loaded) -> None:
+        """The next frame of the log."""
+        slot = self._slots[self._pushed]
+        self._pushed += 1
+        if self._only_truth and not slot.has_truth:
+            return
+        if loaded.frame is None:
+            reason = "" if loaded.error is None else loaded.error.reason
+            self._end(slot, loaded, Outcome.UNDECODABLE, reason=reason)
+        elif slot.missing:
+            self._end(slot, loaded, Outcome.INCOMPLETE, reason=f"no {' and no '.join(slot.missing)}")
+        else:
+            self._answer(slot, loaded, loaded.frame)
+
+    def _answer(self, slot: Slot, loaded: Loaded, frame: Frame) -> None:
+        registration = self._rule.register(frame) if self._rule.registers else None
+        reason = self._rule.choose(frame, registration)
+        if reason is None:
+            answer = self._rule.propagate(frame, registration)
+            source = None if self._rule.source is None else self._rule.source.index
+            outcome = Outcome.NO_SOURCE if answer is None else Outcome.PROPAGATED
+            self._end(slot, loaded, outcome, answer=answer, keyframe=source)
+            return
+        answer = self._rule.segment(frame, registration)
+        if answer is None:
+            self._end(slot, loaded, Outcome.NO_SOURCE, reason="no truth for the oracle")
+            return
+        self._rule.finish(frame, registration, answer)
+        if self._fuse is not None and self._fuse.can_fuse(frame):
+            self._fuse(frame, answer)
+        self._end(slot, loaded, Outcome.SEGMENTED, answer=answer, keyframe=slot.index, reason=reason)
+
+    def _end(
+        self, slot: Slot, loaded: Loaded, outcome: Outcome, *, answer: Segmentation | None = None,
+        keyframe: int | None = None, reason: str = "",
+    ) -> None:  # fmt: skip
+        labels: Labels | None = None if answer is None else answer.labels
+        self._judge.ended(
+            FrameResult(slot.index, slot.stamp_ns, None, None, None, outcome, keyframe, reason, labels=labels), loaded
+        )

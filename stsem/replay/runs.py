@@ -1,0 +1,202 @@
+"""From what one mode did to its part of the report."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+from stsem.document.accuracy import Coverage, Loss
+from stsem.document.schema import MapScore, Run, TrajectoryScore
+from stsem.document.timing import Latency, Throughput
+from stsem.log.log import Log
+from stsem.metrics.latency import latency
+from stsem.metrics.loss import split
+from stsem.metrics.outcomes import count_outcomes
+from stsem.metrics.scorecard import Accuracy
+from stsem.metrics.throughput import throughput
+from stsem.replay import accuracy, timing
+from stsem.replay.build import Model
+from stsem.replay.config import RunConfig
+from stsem.replay.costing import Costing
+from stsem.replay.engine import ModeRun, Replayed
+from stsem.replay.record import Record
+from stsem.result import Outcome
+
+NO_CLOCK = "--clock offline"
+NO_OFFLINE = "--no-offline"
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What every mode of one report shares."""
+
+    log: Log
+    config: RunConfig
+    model: Model
+    costing: Costing | None
+    replayed: Replayed
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A mode with its scores computed."""
+
+    run: ModeRun
+    offline: Accuracy | None
+    clocked: Accuracy | None
+
+
+def scored(run: ModeRun) -> Found:
+    """Compute the scores of both passes of a mode."""
+
+    def of(record: Record | None) -> Accuracy | None:
+        return None if record is None or record.scorecard is None else record.scorecard.compute()
+
+    return Found(run, of(run.offline), of(run.real_time))
+
+
+def part(context: Context, found: Found, base: Found | None) -> Run:
+    """One mode's part of the report.
+
+    Args:
+        context: of the report.
+        found: the mode.
+        base: `per-frame`, for the network's share of the loss; None if it did not run.
+    """
+    run, config = found.run, context.config
+    record = run.real_time or run.offline
+    if record is None:
+        raise ValueError(f"{run.mode.name} ran neither with a clock nor without")
+    counts = count_outcomes((r.outcome for r in record.results), len(context.replayed.slots))
+    late, fast, inside = _timing(context, run)
+    own = None if found.clocked is None else found.clocked.own
+    streaming = None if found.clocked is None else found.clocked.streaming
+    offline = None if found.offline is None else found.offline.own
+    classes = context.model.classes
+    if classes is None:
+        raise ValueError("a run without classes")
+    return Run(
+        mode=run.mode.name,
+        clock=config.clock,
+        frames=len(context.replayed.slots),
+        outcomes=timing.outcomes({str(outcome): n for outcome, n in counts.items()}),
+        keyframes=tuple(r.index for r in record.results if r.outcome is Outcome.SEGMENTED),
+        keyframe_reasons=dict(
+            sorted(Counter(r.reason for r in record.results if r.outcome is Outcome.SEGMENTED).items())
+        ),
+        keyframes_moved=0 if run.rule is None else run.rule.moved,
+        stages_inside=inside,
+        stages_disabled=_disabled(context, run, record),
+        coverage=_coverage(context, found),
+        offline=accuracy.score(offline, classes),
+        delivered=accuracy.score(own, classes),
+        streaming=accuracy.score(streaming, classes),
+        loss=_loss(context, found, base),
+        strata=accuracy.strata(found.offline, classes),
+        by_distance=accuracy.distances(() if found.offline is None else found.offline.by_distance),
+        by_distance_summary=accuracy.distance_summary(
+            None if found.offline is None else found.offline.distance_summary
+        ),
+        latency_ms=late,
+        throughput=fast,
+        trajectory=_trajectory(context),
+        map=None if run.cloud is None else MapScore(points=len(run.cloud), voxels=len(run.cloud)),
+        not_measured=_why_not(context, found),
+    )
+
+
+def _timing(context: Context, run: ModeRun) -> tuple[Latency | None, Throughput | None, tuple[str, ...]]:
+    if run.real_time is None:
+        return None, None, ()
+    config, results = context.config, run.real_time.results
+    late = latency(results, run.spans, distinct_samples=_distinct_samples(context, run))
+    deadline = timing.deadline_ns(config.deadline_ms, context.log.period_ns, config.exact_rate)
+    fast = throughput(
+        results, run.spans, cores=config.cores, deadline_ns=deadline, rate=float(config.exact_rate)
+    )  # fmt: skip
+    return timing.latency(late), timing.throughput(fast, deadline, None), timing.stages_inside(late.inside)
+
+
+def _distinct_samples(context: Context, run: ModeRun) -> int | None:
+    """Of the slowest stage's profile: what bounds the percentiles (DESIGN 5)."""
+    profile = None if context.costing is None else context.costing.profile
+    if profile is None:
+        return None
+    return profile.distinct_samples_of_slowest({f"{span.stage}@{len(span.cores)}" for span in run.spans})
+
+
+def _disabled(context: Context, run: ModeRun, record: Record) -> dict[str, int]:
+    """Keyframes that `fuse` could not use, because an optional channel is missing for them."""
+    if run.cloud is None:
+        return {}
+    plans = {plan.index: plan for plan in context.log.plans}
+    lacking = sum(
+        bool(plans[r.index].missing(frozenset({"depth", "pose"})))
+        for r in record.results
+        if r.outcome is Outcome.SEGMENTED
+    )
+    return {"fuse": lacking} if lacking else {}
+
+
+def _coverage(context: Context, found: Found) -> Coverage:
+    judged = [a.own.frames for a in (found.offline, found.clocked) if a is not None and a.own is not None]
+    slots = context.replayed.slots
+    return Coverage(
+        frames_with_truth=sum(slot.has_truth for slot in slots), scored=max(judged, default=0), frames=len(slots)
+    )
+
+
+def _loss(context: Context, found: Found, base: Found | None) -> Loss | None:
+    offline = None if found.offline is None else found.offline.own
+    clocked = found.clocked
+    per_frame = None if base is None or base.offline is None else base.offline.own
+    parts = split(
+        per_frame, offline, None if clocked is None else clocked.own, None if clocked is None else clocked.streaming
+    )
+    named = {
+        "network": parts.network, "prediction": parts.prediction, "scheduling": parts.scheduling,
+        "staleness": parts.staleness,
+    }  # fmt: skip
+    if all(value is None for value in named.values()):
+        return None
+    why = {name: _why_no_part(context, name, base) for name, value in named.items() if value is None}
+    return accuracy.loss(named, why)
+
+
+def _why_no_part(context: Context, name: str, base: Found | None) -> str:
+    if name in ("network", "prediction") and base is None:
+        return "the mode per-frame did not run"
+    if not context.config.offline and context.config.clock != "offline" and name != "staleness":
+        return NO_OFFLINE
+    if context.config.clock == "offline" and name in ("scheduling", "staleness"):
+        return NO_CLOCK
+    return "a score that it is made of was not measured"
+
+
+def _trajectory(context: Context) -> TrajectoryScore | None:
+    plans, trajectory = context.log.plans, context.log.trajectory
+    if trajectory is None or not plans:
+        return None
+    posed = sum(plan.pose_log_ns is not None for plan in plans)
+    return TrajectoryScore(pose=context.config.pose, tracked_share=posed / len(plans), n=0)
+
+
+def _why_not(context: Context, found: Found) -> dict[str, str]:
+    config, why = context.config, {}
+    for name, accuracies, absent in (
+        ("offline", found.offline, NO_OFFLINE), ("delivered", found.clocked, NO_CLOCK),
+        ("streaming", found.clocked, NO_CLOCK),
+    ):  # fmt: skip
+        if accuracies is None:
+            why[name] = context.model.reason or absent
+        elif not accuracies.measured:
+            why[name] = accuracies.reason
+    if config.clock == "offline":
+        why["latency_ms"] = why["throughput"] = NO_CLOCK
+    elif not config.sustainable:
+        why["throughput.sustainable_hz"] = "not searched for (--sustainable)"
+    if found.run.cloud is None:
+        why["map"] = "--map off" if not config.map else "the log lacks depth, poses or camera intrinsics"
+    if context.log.trajectory is None:
+        why["trajectory"] = "the log has no poses"
+    else:
+        why["trajectory.ate_rmse_m"] = "the log's poses are used as they are"
+    return why
