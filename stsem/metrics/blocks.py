@@ -34,7 +34,7 @@ class Blocks:
         autocorrelation_ns: the longest autocorrelation time found.
         inflation: what the variance between independent blocks is multiplied by for the correlation that is left
             between neighbours: 1 + (tau^2 - 1) / (2 l tau) for blocks of l samples whose correlation decays
-            exponentially, from cov(neighbours) = sigma^2 (tau^2 - 1) / 4 and var(block) = sigma^2 l tau. At most 1 + 1/6.
+            exponentially, from cov(neighbours) = sigma^2 (tau^2 - 1) / 4 and var(block) = sigma^2 l tau.
     """
 
     of_frame: npt.NDArray[np.int64]

@@ -24,6 +24,7 @@ Floats = npt.NDArray[np.float64]
 RESAMPLES = 2000
 MIN_LOGS = 10
 _TAIL_PER_MILLE = 25
+_NOTHING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -81,9 +82,11 @@ def shared_blocks(runs: Sequence[Samples], metric: Metric) -> Blocks | NoInterva
         ValueError: the runs were not judged on the same frames.
     """
     _require_same_frames(runs)
+    if not runs[0].class_set.any():
+        return NoInterval("no pixel with truth was judged")
     series = [_Ratios(run.tallies, metric, run.class_set).influence() for run in runs]
     differences = [other - series[0] for other in series[1:]]
-    return cut(runs[0].stamp_ns, [*series, *differences]) if len(runs[0]) else NoInterval("no frame was judged")
+    return cut(runs[0].stamp_ns, [*series, *differences])
 
 
 def over_logs(
@@ -116,7 +119,6 @@ class _Ratios:
         else:
             self.above, self.below = (right.sum(axis=1, keepdims=True) + 0.0, truth.sum(axis=1, keepdims=True) + 0.0)
         self.fill = self.above.sum(axis=0) / self.below.sum(axis=0)
-        self.value = float(self.fill.mean())
 
     def resampled(self, counts: Floats) -> tuple[Floats, Floats]:
         """Values (R,) and influences (R, units) for resamples that hold unit u `counts[r, u]` times.
@@ -154,7 +156,7 @@ def _bootstrap(
     """Bootstrap-t of the score of tallies (units, 3, C), or of the difference of the second's from the first's."""
     class_set = np.asarray(tallies[0][:, 1].sum(axis=0) > 0)
     if not class_set.any():
-        return NoInterval("the truth labels no pixel")
+        return NoInterval("no pixel with truth was judged")
     scores = [_Ratios(one, metric, class_set) for one in tallies]
     units = len(tallies[0])
     counts = generator(seed, "bootstrap", units).multinomial(units, np.full(units, 1 / units), RESAMPLES)
@@ -181,14 +183,15 @@ def _value_and_error(scores: Sequence[_Ratios], counts: Floats) -> tuple[Floats,
 
 def _studentised(value: float, error: float, values: Floats, errors: Floats) -> tuple[float, float]:
     """Bounds value - t error at the order statistics of t = (value* - value) / error*; infinite where t is."""
+    if error < _NOTHING:
+        return value, value
     off = values - value
-    off[np.abs(off) < 1e-12] = 0.0
-    flat = errors < 1e-12
+    off[np.abs(off) < _NOTHING] = 0.0
+    flat = errors < _NOTHING
     t = np.where(flat, np.where(off == 0, 0.0, np.copysign(np.inf, off)), off / np.where(flat, 1.0, errors))
     t.sort()
-    upper, lower = t[len(t) - 1 - len(t) * _TAIL_PER_MILLE // 1000], t[len(t) * _TAIL_PER_MILLE // 1000]
-    if error < 1e-12:
-        return value, value
+    tail = len(t) * _TAIL_PER_MILLE // 1000
+    lower, upper = t[tail], t[-1 - tail]
     return float(value - upper * error), float(value - lower * error)
 
 

@@ -51,7 +51,7 @@ def umeyama(source: npt.NDArray[np.float64], target: npt.NDArray[np.float64]) ->
     mean_source, mean_target = source.mean(axis=0), target.mean(axis=0)  # eq. 34, 35
     covariance = (target - mean_target).T @ (source - mean_source) / len(source)  # eq. 38
     U, singular, Vt = np.linalg.svd(covariance)  # eq. 39
-    if np.count_nonzero(singular > np.finfo(np.float64).eps) < 2:
+    if np.count_nonzero(singular > 1e-12 * singular[0]) < 2:
         raise ValueError("an alignment needs points that do not lie on one line")
     S = np.diag([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])  # eq. 43
     T = np.eye(4)
