@@ -123,12 +123,12 @@ def test_a_cost_is_a_whole_number_of_nanoseconds(cost: int) -> None:
 
 
 def test_ten_frames_worked_out_by_hand() -> None:
-    """Ten frames 100 ms apart: `track` (30 ms, 1 core) for each, `segment` (250 ms, 2 cores) for 0, 4 and 8,
-    `propagate` (20 ms, 1 core) for the others; everything is ready at arrival.
+    """The schedule of ten frames, 100 ms apart, on two cores.
 
-    0: track on core 0 at 0, segment waits for both cores until 30, ends at 280. Frames 1 and 2 wait behind it; at 280
-    1's track and propagate start side by side, at 300 2's track, at 310 2's propagate. Frame 3 finds free cores at 300:
-    it is younger than 2, so its track starts at 330 (core 0, with 2's propagate ending on 1 at 330), and so on.
+    Every frame is tracked (30 ms, 1 core); then 0, 4 and 8 are segmented (250 ms, 2 cores) and the others propagated
+    (20 ms, 1 core); both are ready at arrival. Frame 0's segmentation waits until its tracking frees the other core and
+    runs from 30 to 280; frames 1 and 2 arrive meanwhile and wait. At 280 frame 1 gets both cores; at 300 core 1 goes to
+    frame 2, although frame 3 arrives just then; at 330 both cores are free for frame 3. At 400 it begins anew.
     """
     ms = 1_000_000
     requests: list[Request] = []
