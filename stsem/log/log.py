@@ -1,6 +1,6 @@
 """A recorded log, opened: what it is, how its frames are made, and random access to frames and truth."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -80,7 +80,7 @@ def open_log(
     """
     files = find_files(paths)
     scanned = scan(files, progress)
-    store = Store(files, scanned.chunks)
+    store = Store(files, scanned.chunks, scanned.opened)
     try:
         assembly = assemble(scanned, store, topics or {}, classes_file, depth_registered)
         rows = window(assembly.color.rows.stamp_ns, start_s, end_s)
@@ -183,7 +183,7 @@ class Log:
             self._unknown_pixels[row] = unknown
         return labels
 
-    def frames(self, indices: Iterable[int], *, depth: bool, previous: bool, truth: bool) -> Iterator[Loaded]:
+    def frames(self, indices: Iterable[int], *, depth: bool, previous: bool, truth: bool) -> Generator[Loaded, None, None]:
         """The frames at `indices`, in that order, decoded ahead; nothing is left running however the loop ends."""
 
         def load(index: int) -> Loaded:

@@ -2,7 +2,7 @@
 
 import threading
 from collections import OrderedDict, deque
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Generator, Hashable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Generic, TypeVar
 
@@ -13,7 +13,7 @@ WORKERS = 2
 AHEAD = 4
 
 
-def prefetched(make: Callable[[K], T], keys: Iterable[K], workers: int = WORKERS, ahead: int = AHEAD) -> Iterator[T]:
+def prefetched(make: Callable[[K], T], keys: Iterable[K], workers: int = WORKERS, ahead: int = AHEAD) -> Generator[T, None, None]:
     """`make(key)` for each of `keys`, in order, with at most `ahead` results waiting.
 
     An exception of `make` is raised where its result would have come. However the iteration ends (exhausted, closed,
