@@ -1,5 +1,6 @@
 """Which cost source a configuration asks for."""
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Callable
@@ -88,12 +89,12 @@ def calibration_frames(log: Log, *, fused: bool) -> list[Frame]:
     Raises:
         CostError: fewer than two frames can be decoded.
     """
-    found = []
-    for loaded in log.frames([plan.index for plan in log.plans], depth=fused, previous=True, truth=False):
-        if loaded.frame is not None:
-            found.append(loaded.frame)
-        if len(found) == _CALIBRATION_FRAMES:
-            break
+    found: list[Frame] = []
+    indices = [plan.index for plan in log.plans]
+    with contextlib.closing(log.frames(indices, depth=fused, previous=True, truth=False)) as supply:
+        while len(found) < _CALIBRATION_FRAMES and (loaded := next(supply, None)) is not None:
+            if loaded.frame is not None:
+                found.append(loaded.frame)
     if len(found) < 2:
         raise CostError("Costs cannot be measured on fewer than two decodable frames; give a profile with --costs.")
     return found
