@@ -112,7 +112,7 @@ def _floor(path: Path) -> Iterator[Row]:
                     held = {}
                 else:
                     raw = np.frombuffer(record.data[-2 * HEIGHT * WIDTH :], "<u2").reshape(HEIGHT, WIDTH)
-                    held["depth"] = MILLIMETRES_TO_METRES[raw]
+                    held["depth"] = MILLIMETRES_TO_METRES.take(raw, mode="wrap")
 
 
 def _harness(path: Path) -> int:

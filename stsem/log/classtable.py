@@ -61,7 +61,7 @@ class Translator:
         elif raw.dtype == np.uint8:
             labels = np.asarray(cv2.LUT(raw, self._ids(256)), np.uint8)
         else:
-            labels = self._ids(1 << 16)[raw]
+            labels = self._ids(1 << 16).take(raw, mode="wrap")
         if len(self._table.classes) > _UNKNOWN:
             return labels, 0
         unknown = labels == _UNKNOWN

@@ -196,8 +196,8 @@ def parse_chunk(record: Record) -> tuple[Chunk, memoryview]:
     return Chunk(start, length, compression, size, crc), data[:length]
 
 
-def decompress(chunk: Chunk, data: memoryview | bytes) -> bytes:
-    """The records of a chunk, of exactly its stated size and with its checksum.
+def decompress(chunk: Chunk, data: memoryview | bytes, *, check: bool) -> bytes:
+    """The records of a chunk, of exactly its stated size and, with `check`, with its checksum.
 
     Raises:
         BrokenChunkError: they are not.
@@ -210,7 +210,7 @@ def decompress(chunk: Chunk, data: memoryview | bytes) -> bytes:
         raise BrokenChunkError("chunk_unreadable", str(err)) from err
     if len(records) != chunk.uncompressed_size:
         raise BrokenChunkError("chunk_unreadable", f"{len(records)} bytes came instead of {chunk.uncompressed_size}")
-    if chunk.crc and zlib.crc32(records) != chunk.crc:
+    if check and chunk.crc and zlib.crc32(records) != chunk.crc:
         raise BrokenChunkError("chunk_crc", "the checksum differs")
     return records
 

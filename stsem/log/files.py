@@ -4,7 +4,7 @@ import os
 import re
 import threading
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +13,7 @@ from typing import BinaryIO, Self
 from stsem.errors import LogError
 from stsem.log.container import BrokenChunkError, Chunk, decompress, open_file
 
-CACHE_BYTES = 64 << 20
+CACHE_BYTES = 96 << 20
 
 
 @dataclass(frozen=True)
@@ -66,14 +66,18 @@ class Store:
     Args:
         files: of the log.
         chunks: place in the log -> chunk; a place that is not among them is that of a message in no chunk.
+        opened: content of chunks that are decompressed already.
         cache_bytes: the most that decompressed chunks may take (the newest chunk is always kept).
     """
 
-    def __init__(self, files: Sequence[File], chunks: dict[int, Chunk], cache_bytes: int = CACHE_BYTES) -> None:
+    def __init__(
+        self, files: Sequence[File], chunks: Mapping[int, Chunk], opened: Mapping[int, bytes] | None = None,
+        cache_bytes: int = CACHE_BYTES,
+    ) -> None:  # fmt: skip
         self._files, self._chunks, self._limit = files, chunks, cache_bytes
         self._handles: dict[Path, BinaryIO] = {}
-        self._cache: OrderedDict[int, bytes] = OrderedDict()
-        self._held = 0
+        self._cache: OrderedDict[int, bytes] = OrderedDict(opened or {})
+        self._held = sum(map(len, self._cache.values()))
         self._closed = False
         self._lock = threading.Lock()
         self.decompressed = 0
@@ -118,7 +122,7 @@ class Store:
     def _load(self, place: int, chunk: Chunk) -> bytes:
         data = self._read(place, chunk.start, chunk.length)
         try:
-            records = decompress(chunk, data)
+            records = decompress(chunk, data, check=False)
         except BrokenChunkError as err:
             raise self._changed(place) from err
         self.decompressed += 1

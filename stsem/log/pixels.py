@@ -124,7 +124,8 @@ def depth(message: ImageMessage) -> Depth:
         if encoding.order != "metric":
             raise ValueError(f"depth needs 16UC1 or 32FC1, but {message.encoding} came")
     if pixels.dtype.kind == "u":
-        return MILLIMETRES_TO_METRES[pixels]
+        # Every 16-bit number is in the table; "wrap" is the mode that checks least.
+        return MILLIMETRES_TO_METRES.take(pixels, mode="wrap")
     metres = pixels.astype(np.float32)
     metres[~(np.isfinite(metres) & (metres > 0))] = np.nan
     return metres

@@ -25,7 +25,7 @@ from stsem.log.container import (
     read_records,
 )
 from stsem.log.damage import Damage
-from stsem.log.files import File, Store
+from stsem.log.files import CACHE_BYTES, File, Store
 from stsem.log.fingerprint import Fingerprint
 from stsem.log.tracks import Track
 
@@ -47,8 +47,10 @@ class Scan:
         tracks: by (topic, encoding, schema name), in order of first appearance.
         chunks: place in the log -> chunk, of the chunks whose content can be trusted.
         metadata: name -> the content of its last record.
+        opened: place in the log -> content of the first chunks, as much as a Store may hold.
         attachments: name -> bytes, of those that are not huge.
         profile, library: of the first file.
+        opened_bytes: of all chunks, kept or not.
     """
 
     files: Sequence[File]
@@ -56,10 +58,12 @@ class Scan:
     sha256: str = ""
     tracks: dict[tuple[str, str, str], Track] = field(default_factory=dict)
     chunks: dict[int, Chunk] = field(default_factory=dict)
+    opened: dict[int, bytes] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     profile: str = ""
     library: str = ""
+    opened_bytes: int = 0
 
 
 def scan(files: Sequence[File], progress: Progress | None = None) -> Scan:
@@ -83,7 +87,7 @@ def scan(files: Sequence[File], progress: Progress | None = None) -> Scan:
 
 def _open(record: Record) -> tuple[Chunk, bytes]:
     chunk, data = parse_chunk(record)
-    return chunk, decompress(chunk, data)
+    return chunk, decompress(chunk, data, check=True)
 
 
 @dataclass
@@ -143,9 +147,16 @@ class _FileScan:
             self._count_lost(pending.indexes)
             return
         self._result.chunks[pending.place] = chunk
+        self._keep(pending.place, records)
         view = memoryview(records)
         for opcode, start, end in self._inside(records):
             self._record(opcode, view[start:end], pending.place, start)
+
+    def _keep(self, place: int, records: bytes) -> None:
+        """Short logs need no second decompression."""
+        self._result.opened_bytes += len(records)
+        if self._result.opened_bytes <= CACHE_BYTES:
+            self._result.opened[place] = records
 
     def _count_lost(self, indexes: list[bytes]) -> None:
         """Nothing is ever found by an index; it only tells how many messages a lost chunk had."""
