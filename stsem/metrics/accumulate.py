@@ -33,6 +33,11 @@ class Samples:
         return pixel_accuracies(self.tallies)
 
     @property
+    def pixel_accuracy_by_index(self) -> dict[int, float]:
+        """Pixel accuracy by log index."""
+        return dict(zip(self.index.tolist(), self.pixel_accuracy.tolist(), strict=True))
+
+    @property
     def class_set(self) -> ClassMask:
         """(C,) the classes with truth pixels in the full sample."""
         return np.asarray(self.tallies[:, 1].sum(axis=0) > 0)
@@ -45,7 +50,7 @@ class Judged:
     Args:
         scores: over the summed matrix.
         matrix: (C, C + 1) int64, the sum itself.
-        frames: frames with truth that were judged.
+        frames: frames with truth that were scored.
         misses: those of them without any answer; every pixel of them is wrong.
         miou_common: mIoU over the classes that the network knows and the truth shows; NaN without such a class, None
             if the network's classes were not stated.
@@ -71,8 +76,8 @@ class Judged:
         return int(self.matrix[:, -1].sum()) / pixels if pixels else float("nan")
 
 
-class FrameTallies:
-    """Accumulates one judgement frame by frame.
+class Total:
+    """Accumulates one judgement into one matrix.
 
     Args:
         classes: C.
@@ -85,54 +90,61 @@ class FrameTallies:
     def __init__(self, classes: int, known: ClassMask | None = None) -> None:
         self._matrix = np.zeros((classes, classes + 1), np.int64)
         self._known = known
+        self._frames = self._misses = 0
+
+    def update(self, matrix: Matrix, *, missed: bool) -> None:
+        """Add the matrix (C, C + 1) of one frame; `missed`: it had no answer."""
+        self._matrix += matrix
+        self._frames += 1
+        self._misses += missed
+
+    def compute(self) -> Judged | None:
+        """The scores so far; None before the first frame."""
+        if not self._frames:
+            return None
+        common = None if self._known is None else self._known & (self._matrix.sum(axis=1) > 0)
+        return Judged(
+            scores=scores(self._matrix),
+            matrix=self._matrix.copy(),
+            frames=self._frames,
+            misses=self._misses,
+            miou_common=None if common is None else mean_iou_over(tally(self._matrix), common),
+            classes_common=None if common is None else int(common.sum()),
+        )
+
+
+class FrameTallies:
+    """Keeps the tally of every frame of one judgement.
+
+    Args:
+        classes: C.
+    """
+
+    unit: ClassVar[str] = "fraction"
+    higher_is_better: ClassVar[bool] = True
+
+    def __init__(self, classes: int) -> None:
+        self._classes = classes
         self._stamps: dict[int, int] = {}
         self._tallies: dict[int, npt.NDArray[np.int32]] = {}
-        self._misses = 0
 
-    def __len__(self) -> int:
-        return len(self._tallies)
-
-    def __contains__(self, index: int) -> bool:
-        return index in self._tallies
-
-    def update(self, index: int, stamp_ns: int, matrix: Matrix, *, missed: bool) -> None:
-        """Add the matrix (C, C + 1) of frame `index`; `missed`: it had no answer.
+    def update(self, index: int, stamp_ns: int, matrix: Matrix) -> None:
+        """Add the matrix (C, C + 1) of frame `index`.
 
         Raises:
             ValueError: the frame was judged before.
         """
         if index in self._tallies:
             raise ValueError(f"frame {index} was judged twice; every frame is judged once")
-        self._matrix += matrix
         self._stamps[index] = stamp_ns
         self._tallies[index] = tally(matrix).astype(np.int32)
-        self._misses += missed
 
-    def compute(self) -> Judged | None:
-        """The scores so far; None before the first frame."""
-        if not self._tallies:
-            return None
-        common = None if self._known is None else self._known & (self._matrix.sum(axis=1) > 0)
-        return Judged(
-            scores=scores(self._matrix),
-            matrix=self._matrix.copy(),
-            frames=len(self),
-            misses=self._misses,
-            miou_common=None if common is None else mean_iou_over(tally(self._matrix), common),
-            classes_common=None if common is None else int(common.sum()),
-        )
-
-    def samples(self) -> Samples:
+    def compute(self) -> Samples:
         """What bootstrap and pairing need."""
         order = sorted(self._tallies)
-        empty = np.zeros((0, 3, len(self._matrix)), np.int64)
+        empty = np.zeros((0, 3, self._classes), np.int64)
         return Samples(
             index=np.array(order, np.int64),
             stamp_ns=np.array([self._stamps[i] for i in order], np.int64),
             tallies=np.stack([self._tallies[i] for i in order]).astype(np.int64) if order else empty,
         )
-
-    def pixel_accuracy(self) -> dict[int, float]:
-        """Pixel accuracy by log index; NaN for a frame whose truth is all "ignore"."""
-        samples = self.samples()
-        return dict(zip(samples.index.tolist(), samples.pixel_accuracy.tolist(), strict=True))

@@ -10,7 +10,7 @@ Metric = Literal["miou", "pixel_accuracy"]
 
 @dataclass(frozen=True)
 class Part:
-    """One part of the loss: a fraction (negative: a gain) over `n` frames with truth."""
+    """One part of the loss: a fraction (negative: a gain); `n` frames are behind the scarcer of its two scores."""
 
     value: float
     n: int
@@ -23,8 +23,9 @@ class Loss:
     Args:
         network: 1 - offline(per-frame): what the network gets wrong.
         prediction: offline(per-frame) - offline(mode): what predicting instead of segmenting costs.
-        scheduling: offline(mode) - delivered: what drops and late keyframes cost.
-        staleness: delivered - streaming: what the world's moving on costs until an answer is there.
+        scheduling: offline(mode) - delivered: what other keyframes, and longer distances to them, cost.
+        staleness: delivered - streaming: what the world's moving on costs until an answer is there, the wait for the
+            first one included.
     """
 
     network: Part | None
@@ -77,9 +78,6 @@ def split(
         offline: offline score of this mode (for `per-frame`: the same once more).
         delivered, streaming: scores of this mode's real-time run.
         metric: which score.
-
-    Raises:
-        ValueError: two scores that are subtracted were not judged on the same number of frames and pixels.
     """
     return Loss(
         network=_network(per_frame, metric),
@@ -104,7 +102,4 @@ def _difference(before: Judged | None, after: Judged | None, metric: Metric) -> 
     upper, lower = _value(before, metric), _value(after, metric)
     if before is None or after is None or upper is None or lower is None:
         return None
-    basis, other = (before.frames, before.scores.pixels), (after.frames, after.scores.pixels)
-    if basis != other:
-        raise ValueError(f"scores over {basis} and {other} frames and pixels cannot be subtracted; judge the same ones")
-    return Part(upper - lower, before.frames)
+    return Part(upper - lower, min(before.frames, after.frames))

@@ -8,14 +8,17 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.classes import ClassSet, Labels
-from stsem.metrics.accumulate import FrameTallies, Judged, Samples
+from stsem.metrics.accumulate import FrameTallies, Judged, Samples, Total
 from stsem.metrics.by_distance import ByDistance, DistanceRow, DistanceSummary, summarise
-from stsem.metrics.confusion import Matrix, confusion
+from stsem.metrics.confusion import confusion
 from stsem.metrics.durations import Durations, Summary
 from stsem.metrics.scores import tally
 from stsem.result import Outcome
 
 STRATA = (Outcome.SEGMENTED, Outcome.PROPAGATED)
+
+SCORED = (Outcome.SEGMENTED, Outcome.PROPAGATED, Outcome.NO_SOURCE)
+"""Outcomes that the offline and the delivered score contain: the mode answered, if only with "no label"."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +26,7 @@ class Accuracy:
     """Everything that a scorecard found.
 
     Args:
-        own: answers against their own frames: the `offline` or the `delivered` score; None: not measured.
+        own: answers against their own frames: the `offline` or the `delivered` score; None: nothing was answered.
         streaming: at every truth frame's arrival, the newest finished answer against that frame; None: not measured.
         age: of those newest answers, milliseconds: arrival of the truth frame - stamp of the answer used.
         strata: `own` of the segmented and of the propagated frames; a stratum without frames is absent.
@@ -66,8 +69,10 @@ class Scorecard:
         if known is not None and known.shape != (len(classes),):
             raise ValueError(f"`known` of shape {known.shape} does not fit {len(classes)} classes")
         self._classes, self._known = classes, known
-        self._own, self._streaming = self._tallies(), self._tallies()
-        self._strata = {outcome: self._tallies() for outcome in STRATA}
+        self._own, self._streaming = self._total(), self._total()
+        self._strata = {outcome: self._total() for outcome in STRATA}
+        self._frames, self._instants = FrameTallies(len(classes)), FrameTallies(len(classes))
+        self._scored: set[int] = set()
         self._distances = ByDistance(len(classes))
         self._ages = Durations()
 
@@ -84,11 +89,14 @@ class Scorecard:
     ) -> None:
         """Judge an answer against its own frame (offline, or as delivered): once for EVERY frame with truth.
 
+        The score contains the outcomes `SCORED`; a dropped, pending, undecodable or incomplete frame is no answer of
+        the mode and stays out of it. The samples for pairing contain every frame, those as all "no label".
+
         Args:
             index: log index.
             stamp_ns: capture stamp.
             truth: (H, W) uint8, NO_LABEL is ignored.
-            answer: (h, w) uint8; None when the frame got no answer: every pixel is wrong.
+            answer: (h, w) uint8; None when the frame got no answer.
             outcome: how the answer was made, or why there is none.
             distance, distance_ns: to the keyframe that the answer comes from, in log indices and stamps; or None.
 
@@ -96,9 +104,12 @@ class Scorecard:
             ValueError: the frame was judged before, or an image is not a label image.
         """
         matrix = confusion(truth, answer, len(self._classes))
-        self._own.update(index, stamp_ns, matrix, missed=answer is None)
+        self._frames.update(index, stamp_ns, matrix)
+        if outcome in SCORED:
+            self._own.update(matrix, missed=answer is None)
+            self._scored.add(index)
         if outcome in self._strata:
-            self._strata[outcome].update(index, stamp_ns, matrix, missed=answer is None)
+            self._strata[outcome].update(matrix, missed=answer is None)
         if answer is not None and distance is not None and distance_ns is not None:
             self._distances.update(distance, distance_ns, matrix)
 
@@ -116,17 +127,19 @@ class Scorecard:
         Raises:
             ValueError: the frame was judged so before, or an image is not a label image.
         """
-        matrix: Matrix = confusion(truth, answer, len(self._classes))
-        self._streaming.update(index, 0, matrix, missed=answer is None)
+        matrix = confusion(truth, answer, len(self._classes))
+        self._instants.update(index, 0, matrix)
+        self._streaming.update(matrix, missed=answer is None)
         if age_ns is not None:
             self._ages.update(age_ns)
 
     def compute(self) -> Accuracy:
         """All scores of the run."""
         own, streaming = self._own.compute(), self._streaming.compute()
-        reason = self._why_nothing(own or streaming)
+        widest = streaming or own
+        reason, unknown = self._why_nothing(widest), self._unknown(widest)
         if reason:
-            return Accuracy(None, None, None, {}, (), None, self._unknown(own or streaming), reason)
+            return Accuracy(None, None, None, {}, (), None, unknown, reason)
         rows = self._distances.compute()
         strata = {str(outcome): found for outcome, kept in self._strata.items() if (found := kept.compute())}
         return Accuracy(
@@ -136,13 +149,13 @@ class Scorecard:
             strata=strata,
             by_distance=rows,
             distance_summary=summarise(rows),
-            unknown=self._unknown(own or streaming),
+            unknown=unknown,
             reason="",
         )
 
     def samples(self) -> Samples:
-        """Per-frame tallies of the answers against their own frames, for intervals and pairing."""
-        return self._own.samples()
+        """Tallies of every frame given to `judge`, for intervals and pairing; unanswered ones as all "no label"."""
+        return self._frames.compute()
 
     def streaming_samples(self) -> Samples:
         """Per-frame tallies of the streaming judgement; stamps are those given to `judge` for the same frames.
@@ -150,7 +163,7 @@ class Scorecard:
         Raises:
             ValueError: a frame was judged streaming, but never against itself.
         """
-        found, own = self._streaming.samples(), self._own.samples()
+        found, own = self._instants.compute(), self._frames.compute()
         stamps = dict(zip(own.index.tolist(), own.stamp_ns.tolist(), strict=True))
         missing = [i for i in found.index.tolist() if i not in stamps]
         if missing:
@@ -159,19 +172,20 @@ class Scorecard:
         return Samples(found.index, stamp_ns, found.tallies)
 
     def pixel_accuracy(self) -> dict[int, float]:
-        """Pixel accuracy of answers against their own frames by log index (frames.csv); NaN: truth is all "ignore"."""
-        return self._own.pixel_accuracy()
+        """Pixel accuracy of the scored answers by log index (frames.csv); NaN: the truth is all "ignore"."""
+        found = self.samples().pixel_accuracy_by_index
+        return {index: value for index, value in found.items() if index in self._scored}
 
     def streaming_pixel_accuracy(self) -> dict[int, float]:
         """The same for the streaming judgement."""
-        return self._streaming.pixel_accuracy()
+        return self._instants.compute().pixel_accuracy_by_index
 
-    def _tallies(self) -> FrameTallies:
-        return FrameTallies(len(self._classes), self._known)
+    def _total(self) -> Total:
+        return Total(len(self._classes), self._known)
 
     def _why_nothing(self, judged: Judged | None) -> str:
         if judged is None:
-            return "no frame with truth was judged"
+            return "no frame with truth was answered"
         if not judged.scores.pixels:
             return "the truth labels no pixel with a class of the log"
         if judged.classes_common == 0:

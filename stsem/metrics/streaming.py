@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from stsem.classes import Labels
-from stsem.metrics.accumulate import FrameTallies, Judged
+from stsem.metrics.accumulate import Judged, Total
 from stsem.metrics.confusion import confusion
 
 
@@ -62,13 +62,13 @@ class StreamingMeter:
 
     def __init__(self, classes: int) -> None:
         self._classes = classes
-        self._tallies = FrameTallies(classes)
+        self._total = Total(classes)
 
     def update(self, instant: Instant, answer: Answer | None) -> None:
         """Judge `answer` (None: a miss) against the truth of `instant`."""
         matrix = confusion(instant.truth, None if answer is None else answer.labels, self._classes)
-        self._tallies.update(instant.index, instant.now_ns, matrix, missed=answer is None)
+        self._total.update(matrix, missed=answer is None)
 
     def compute(self) -> Judged | None:
         """The score so far; None before the first instant."""
-        return self._tallies.compute()
+        return self._total.compute()

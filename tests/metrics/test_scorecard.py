@@ -27,24 +27,43 @@ def judged(card: Scorecard, index: int, outcome: Outcome, distance: int | None) 
 
 
 def test_totals_and_strata_are_sums_over_frames() -> None:
-    """Every frame counts in the total; segmented and propagated frames in their stratum; a drop in neither."""
+    """Answers count in the total and in their stratum, `no_source` as unlabelled; a drop only in the paired samples."""
     card = Scorecard(CLASSES)
     kinds = [Outcome.SEGMENTED, Outcome.PROPAGATED, Outcome.DROPPED_BUSY, Outcome.PROPAGATED, Outcome.NO_SOURCE]
     steps = [0, 1, None, 3, None]
     pairs = [judged(card, i, kind, step) for i, (kind, step) in enumerate(zip(kinds, steps, strict=True))]
     found = card.compute()
     matrices = [confusion(t, a, 3) for t, a in pairs]
+    scored = matrices[0] + matrices[1] + matrices[3] + matrices[4]
     assert found.own is not None
     assert found.measured
-    np.testing.assert_array_equal(found.own.matrix, sum(matrices))
-    assert found.own.scores.miou == scores(np.sum(matrices, axis=0)).miou
-    assert (found.own.frames, found.own.misses) == (5, 2)
+    np.testing.assert_array_equal(found.own.matrix, scored)
+    assert found.own.scores.miou == scores(scored).miou
+    assert (found.own.frames, found.own.misses) == (4, 1)
+    assert found.own.class_pixels.tolist() == scored.sum(axis=1).tolist()
+    assert found.own.unlabelled_share == 1 / 4
     assert set(found.strata) == {"segmented", "propagated"}
     np.testing.assert_array_equal(found.strata["propagated"].matrix, matrices[1] + matrices[3])
     assert [(r.frames, r.n) for r in found.by_distance] == [(0, 1), (1, 1), (3, 1)]
-    assert found.streaming is None
-    assert found.age is None
-    assert card.pixel_accuracy()[2] == 0
+    assert (found.streaming, found.age) == (None, None)
+    assert sorted(card.pixel_accuracy()) == [0, 1, 3, 4]
+    assert card.pixel_accuracy()[4] == 0
+    np.testing.assert_array_equal(card.samples().tallies, [tally(matrix) for matrix in matrices])
+
+
+@pytest.mark.parametrize("outcome", [o for o in Outcome if not o.is_answer and o is not Outcome.NO_SOURCE])
+def test_a_frame_that_is_no_answer_is_judged_streaming_only(outcome: Outcome) -> None:
+    """Nothing delivered is not measured, never 0; the streaming score is there all the same."""
+    card = Scorecard(CLASSES)
+    truth, _ = scene(0)
+    card.judge(0, 0, truth, None, outcome=outcome, distance=None, distance_ns=None)
+    assert "was answered" in card.compute().reason
+    card.judge_streaming(0, truth, None, age_ns=None)
+    found = card.compute()
+    assert found.measured
+    assert found.own is None
+    assert found.streaming is not None
+    assert (found.streaming.scores.miou, found.streaming.misses) == (0, 1)
 
 
 def test_streaming_is_kept_apart_from_delivered() -> None:
@@ -107,7 +126,7 @@ def test_nothing_to_measure_is_not_zero(known: list[bool], truth: int, said: str
     assert said in found.reason
     assert not found.measured
     assert found.own is None
-    assert "no frame with truth" in Scorecard(CLASSES).compute().reason
+    assert "no frame with truth was answered" in Scorecard(CLASSES).compute().reason
 
 
 def test_a_frame_is_judged_once() -> None:
