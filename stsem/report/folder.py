@@ -9,8 +9,12 @@ from pathlib import Path
 from stsem.document.canonical import to_bytes
 from stsem.document.schema import Document
 from stsem.errors import OutputError
+from stsem.report.contents import outline
 from stsem.report.frames_csv import frames_csv
+from stsem.report.html import html
 from stsem.report.inputs import ReportInputs
+from stsem.report.markdown import markdown
+from stsem.report.plots.gallery import draw_all
 
 
 def folder_name(document: Document) -> str:
@@ -36,6 +40,7 @@ def write_folder(inputs: ReportInputs, folder: Path) -> Path:
                 (aside / name).write_bytes(data)
         if inputs.point_cloud is not None:
             shutil.copyfile(inputs.point_cloud, aside / "map.ply")
+        _write_views(inputs, aside)
     return folder
 
 
@@ -45,6 +50,17 @@ _FILES: dict[str, Callable[[ReportInputs], bytes | None]] = {
     "trace.json": lambda inputs: inputs.trace,
     "trajectory.txt": lambda inputs: inputs.trajectory,
 }
+
+
+def _write_views(inputs: ReportInputs, aside: Path) -> None:
+    pictures = draw_all(inputs)
+    report = outline(inputs.document, frozenset(pictures), inputs.strip_pass)
+    (aside / "report.md").write_text(markdown(report), encoding="utf-8")
+    (aside / "report.html").write_text(html(report, pictures), encoding="utf-8")
+    if pictures:
+        (aside / "plots").mkdir()
+    for name, picture in pictures.items():
+        (aside / "plots" / f"{name}.png").write_bytes(picture.png)
 
 
 def check_target(folder: Path) -> None:

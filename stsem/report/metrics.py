@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 from stsem.document.accuracy import Score
-from stsem.document.part import Part, definition
+from stsem.document.part import Part
 from stsem.document.schema import ComparisonRow, Run
 from stsem.document.timing import Distribution, Latency, Throughput
-from stsem.report.wording import NONE, NOT_MEASURED, number, percent, percentile, points, signed
+from stsem.report.wording import NONE, NOT_MEASURED, meaning, number, percent, percentile, points, signed
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Metric:
     @property
     def meaning(self) -> str:
         """The sentence of the schema that defines it."""
-        return definition(self.part, self.field)
+        return meaning(self.part, self.field)
 
     def shown(self, run: Run) -> str:
         """The value in a run, in words if there is none."""

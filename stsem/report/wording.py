@@ -1,5 +1,8 @@
 """How numbers are written for readers: per cent, points, milliseconds; never a blank."""
 
+import re
+
+from stsem.document.part import Part, definition
 from stsem.document.timing import PERCENTILES, Distribution
 
 NOT_MEASURED = "not measured"
@@ -39,6 +42,11 @@ def percentile(samples: Distribution, name: str, digits: int = 1) -> str:
     if value is not None:
         return number(value, digits)
     return TOO_FEW if samples.n and samples.n_effective < PERCENTILES[name][1] else NOT_MEASURED
+
+
+def meaning(part: type[Part], field: str) -> str:
+    """What a number is, in the words of the schema, less what speaks of the file: fractions and nulls."""
+    return re.sub(r"; null [^.;]*|(?<=\.) Fraction\.$", "", definition(part, field))
 
 
 def plural(n: int, noun: str) -> str:

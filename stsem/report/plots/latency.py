@@ -1,0 +1,58 @@
+"""How late the answers are: the share of all frames that is answered within a time."""
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from stsem.report.inputs import ReportInputs
+from stsem.report.plots.style import INK, MUTED, mode_colour, new_figure, title
+
+
+def draw(inputs: ReportInputs) -> Figure | None:
+    """One rising step line per mode; it ends at the share of frames that got an answer; None without a clock."""
+    samples = {run.mode: sorted(t for row in inputs.rows(run.mode) if (t := row.latency_ns) is not None)
+               for run in inputs.document.runs}  # fmt: skip
+    if not any(samples.values()):
+        return None
+    figure = new_figure(3.4)
+    axes = figure.add_subplot()
+    longest = max(times[-1] for times in samples.values() if times) / 1e6
+    heights: list[float] = []
+    for i, run in enumerate(inputs.document.runs):
+        if times := samples[run.mode]:
+            _steps(axes, times, run.frames, longest, mode_colour(run.mode, i))
+            _end(axes, run.mode, 100 * len(times) / run.frames, longest, mode_colour(run.mode, i), heights)
+    _deadline(axes, inputs, longest)
+    axes.set_xlim(0, longest * 1.32)
+    axes.set_ylim(0, 104)
+    axes.set_xlabel("Latency from arrival, ms of simulated time")
+    axes.set_ylabel("Frames answered, %")
+    below = "Share of all frames of the log; what is missing to 100 % was never answered. Dots: medians of the answers."
+    title(axes, "Frames answered within a time", below)
+    return figure
+
+
+def _steps(axes: Axes, times_ns: list[int], frames: int, longest_ms: float, colour: str) -> None:
+    ms = [t / 1e6 for t in times_ns]
+    share = [100 * (k + 1) / frames for k in range(len(ms))]
+    axes.step([0.0, *ms, longest_ms * 1.02], [0.0, *share, share[-1]], where="post", color=colour, linewidth=1.8)
+    middle = (len(ms) + 1) // 2 - 1
+    axes.plot(ms[middle], share[middle], marker="o", color=colour, markersize=6)
+    axes.annotate(f"median {ms[middle]:.0f} ms", (ms[middle], share[middle]), (7, -4), textcoords="offset points",
+                  va="top", fontsize=8, color=colour)  # fmt: skip
+
+
+def _end(axes: Axes, mode: str, share: float, longest_ms: float, colour: str, heights: list[float]) -> None:
+    height = share
+    while any(abs(height - other) < 7 for other in heights):
+        height -= 7
+    heights.append(height)
+    axes.annotate(f"{mode}: {share:.1f} %", (longest_ms * 1.02, height), (5, 0), textcoords="offset points",
+                  va="center", color=colour, fontweight="bold")  # fmt: skip
+
+
+def _deadline(axes: Axes, inputs: ReportInputs, longest_ms: float) -> None:
+    deadlines = {run.throughput.deadline_ms for run in inputs.document.runs if run.throughput}
+    for deadline in sorted(d for d in deadlines if d is not None and d <= 1.3 * longest_ms):
+        axes.axvline(deadline, color=INK, linewidth=1.0, linestyle=(0, (4, 3)))
+        axes.annotate(f"deadline {deadline:g} ms", (deadline, 2), (4, 2), textcoords="offset points", fontsize=8,
+                      color=MUTED)  # fmt: skip

@@ -1,0 +1,116 @@
+"""One look for all pictures, and how they become bytes."""
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib import transforms as mtransforms
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+INK, MUTED, GRID, SURFACE = "#1f2328", "#5b636c", "#d8dee4", "#ffffff"
+WHITE, BLACK = "#fffffe", "#1f2327"
+"""On coloured areas, the same in the light and the dark theme."""
+
+MODE_COLOURS = {"per-frame": "#0072b2", "keyframe": "#d55e00", "keyframe-async": "#009e73"}
+"""Okabe and Ito's colours, told apart with every kind of colour blindness; a mode keeps its own in every picture."""
+_FURTHER = ("#b5488b", "#7a6a00", "#3d5a80")
+
+STAGE_COLOURS = {
+    "register": "#56b4e9", "select": "#9aa4ad", "segment": "#6f4ea0", "propagate": "#e6a817", "track": "#77838e",
+    "fuse": "#a5744f",
+}  # fmt: skip
+UNKNOWN_STAGE = "#9aa4ad"
+
+_RC: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GRID,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.facecolor": "none",
+    "figure.facecolor": SURFACE,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.major.size": 0.0,
+    "ytick.major.size": 0.0,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "stsem",
+    "path.simplify": False,
+}
+
+WIDTH_IN = 8.4
+_PNG_DPI = 150
+_TITLE_PT = 22
+
+
+def mode_colour(mode: str, position: int = 0) -> str:
+    """The colour of a mode; unknown modes get further ones by their position."""
+    return MODE_COLOURS.get(mode, _FURTHER[position % len(_FURTHER)])
+
+
+@contextmanager
+def look() -> Iterator[None]:
+    """The common look: figures are made, drawn and saved inside it; whatever was set before comes back behind it."""
+    with mpl.rc_context(_RC):
+        yield
+
+
+def new_figure(height_in: float) -> Figure:
+    """An empty figure of the common width."""
+    return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+
+
+def title(axes: Axes, text: str, below: str = "") -> None:
+    """A bold title at the left, and a line in grey below it that says what exactly is shown."""
+    axes.set_title(text, loc="left", fontsize=10.5, fontweight="bold", color=INK, pad=_TITLE_PT if below else 8)
+    if below:
+        axes.annotate(below, (0.0, 1.0), (0, 5), "axes fraction", "offset points", fontsize=8.5, color=MUTED)
+
+
+def legend_beside_title(axes: Axes, entries: int) -> None:
+    """The legend at the right end of the title's line."""
+    above = mtransforms.ScaledTranslation(0, _TITLE_PT / 72, axes.figure.dpi_scale_trans)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), bbox_transform=axes.transAxes + above, ncols=entries,
+                borderpad=0.0, borderaxespad=0.0, handlelength=1.4, columnspacing=1.4)  # fmt: skip
+
+
+def png(figure: Figure) -> bytes:
+    """The picture as PNG, without dates."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=_PNG_DPI, metadata={"Software": None})
+    return out.getvalue()
+
+
+_THEMED = {INK: "ink", MUTED: "muted", GRID: "grid", SURFACE: "surface"} | {
+    colour: f"mode-{mode}" for mode, colour in MODE_COLOURS.items()
+}
+
+
+def svg(figure: Figure) -> str:
+    """The picture as an `<svg>` element for HTML: real text, colours that follow the page's light or dark theme."""
+    out = io.StringIO()
+    figure.savefig(out, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    text = out.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r' id="[a-z]+[0-9]*_[0-9_]+"', "", text)
+    text = re.sub(r'<svg ([^>]*?)width="[^"]+" height="[^"]+"|<svg height="[^"]+" width="[^"]+"', r"<svg \1", text)
+    text = re.sub(r"font: ([^;\"]*?)'DejaVu Sans'[^;\"]*", r"font: \1system-ui, sans-serif", text)
+    for colour, name in _THEMED.items():
+        text = text.replace(f": {colour}", f": var(--{name}, {colour})")
+    return text
