@@ -149,7 +149,7 @@ def _lost_track(file: BinaryIO, size: int, place: int, damage: Damage) -> None:
     """A record would reach behind the end of the file: either the file is cut, or its length is wrong."""
     here = file.tell()
     file.seek(size - len(MAGIC))
-    complete = file.read(len(MAGIC)) == MAGIC
+    complete = size - len(MAGIC) >= place and file.read(len(MAGIC)) == MAGIC
     file.seek(here)
     damage.count("bad_record" if complete else "truncated")
     if complete:
