@@ -12,6 +12,7 @@ from stsem.log.tracks import Int64, References
 MAX_DEPTH_OFFSET_NS = 20_000_000
 MAX_CLOCK_OFFSET_NS = 1_000_000_000
 UNKNOWN_PERIOD_NS = 100_000_000
+MAX_CANDIDATES = 16
 NEEDS = frozenset({"depth", "pose"})
 
 
@@ -89,16 +90,19 @@ def pair_truth(color: References, truth: References) -> tuple[Int64, int]:
 def pair(wanted: Int64, offered: Int64, limit_ns: int) -> Int64:
     """(n,) row in `offered` for each of `wanted`, both ascending, at most `limit_ns` away; -1 for none.
 
-    The closest pairs meet first (at equal distance the earlier), and each of `offered` is used once.
+    The closest pairs meet first (at equal distance the earlier), and each of `offered` is used once. Of more than
+    MAX_CANDIDATES equal stamps the rest is not looked at.
     """
     partners = np.full(len(wanted), -1, np.int64)
     if not len(offered):
         return partners
-    right = np.searchsorted(offered, wanted)
-    rows = np.clip(np.stack([right - 1, right, right + 1], axis=1), 0, len(offered) - 1)
-    distance = np.abs(offered[rows] - wanted[:, None])
-    near = np.flatnonzero(distance.ravel() <= limit_ns)
-    owner, rows, distance = near // 3, rows.ravel()[near], distance.ravel()[near]
+    middle = np.searchsorted(offered, wanted)
+    low = np.maximum(np.searchsorted(offered, wanted - limit_ns), middle - MAX_CANDIDATES)
+    high = np.minimum(np.searchsorted(offered, wanted + limit_ns, side="right"), middle + MAX_CANDIDATES)
+    counts = high - low
+    owner = np.repeat(np.arange(len(wanted)), counts)
+    rows = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + low[owner]
+    distance = np.abs(offered[rows] - wanted[owner])
     used = np.zeros(len(offered), np.bool_)
     for k in np.lexsort((rows, owner, distance)):
         if partners[owner[k]] < 0 and not used[rows[k]]:
