@@ -44,15 +44,17 @@ def several_classes(n: int, seed: int) -> Samples:
 
 @pytest.mark.parametrize("phi", [0.0, 0.5, 0.8])
 def test_autocorrelation_time_of_a_known_process(phi: float) -> None:
-    """For an AR(1) series tau is (1 + phi) / (1 - phi)."""
+    """For an AR(1) series tau is (1 + phi) / (1 - phi); the estimate errs on the long side."""
     tau = [autocorrelation_time(ar1(2000, phi, np.random.default_rng(seed))) for seed in range(20)]
-    assert np.mean(tau) == pytest.approx((1 + phi) / (1 - phi), rel=0.15)
+    assert 0.95 <= np.mean(tau) * (1 - phi) / (1 + phi) <= 1.4
 
 
 def test_autocorrelation_time_of_series_without_one() -> None:
-    """Constant, empty, alternating and unjudged series have tau = 1: a frame stands for itself."""
-    for series in (np.ones(50), np.zeros(0), np.full(9, np.nan), np.tile([0.0, 1.0], 30)):
+    """Constant, empty, unjudged, alternating and white series have tau near 1: a frame stands for itself."""
+    for series in (np.ones(50), np.zeros(0), np.full(9, np.nan)):
         assert autocorrelation_time(series) == 1.0
+    assert 1 <= autocorrelation_time(np.tile([0.0, 1.0], 30)) < 1.2
+    assert 1 <= np.mean([autocorrelation_time(np.random.default_rng(i).random(500)) for i in range(20)]) < 1.5
 
 
 def test_blocks_are_stretches_of_time() -> None:
@@ -96,7 +98,7 @@ def test_a_95_per_cent_interval_covers_in_about_95_per_cent(n: int, phi: float) 
     """Simulated coverage, single scores and paired differences, of independent and of correlated frames."""
     rng = np.random.default_rng(7)
     hits: dict[str, list[bool]] = {"single": [], "difference": []}
-    for seed in range(200):
+    for seed in range(120):
         base, other = two_runs(n, phi, rng)
         for name, found, true in (
             ("single", interval(base, "pixel_accuracy", seed=seed), 0.8),
@@ -105,8 +107,22 @@ def test_a_95_per_cent_interval_covers_in_about_95_per_cent(n: int, phi: float) 
             if isinstance(found, Interval):
                 hits[name].append(found.low <= true <= found.high)
     for covered in hits.values():
-        assert len(covered) > 150
+        assert len(covered) > 90
         assert 0.88 <= np.mean(covered) <= 0.99
+
+
+def test_the_saw_tooth_of_keyframes_does_not_hide_slow_changes() -> None:
+    """Accuracy falls by 0.05 a frame until the next keyframe, over a slowly changing scene: coverage stays near 95 %.
+
+    With the plain estimate of the autocorrelation time (1 here, 19 under the saw-tooth) it was 73 %.
+    """
+    rng, hits = np.random.default_rng(8), []
+    for seed in range(120):
+        found = interval(one_class(0.8 - 0.05 * (np.arange(1000) % 5) + 0.03 * ar1(1000, 0.9, rng)), "miou", seed=seed)
+        if isinstance(found, Interval):
+            hits.append(found.low <= 0.7 <= found.high)
+    assert len(hits) > 80
+    assert np.mean(hits) >= 0.86
 
 
 def test_pairing_is_what_makes_differences_sharp() -> None:
