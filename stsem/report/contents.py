@@ -6,12 +6,15 @@ from stsem.document.schema import Document
 from stsem.report.outline import Figure, Outline, Section, Text
 from stsem.report.sections import accuracy, headline, origin, timing
 
-_SECTIONS: tuple[Callable[[Document], Section | None], ...] = (
+_Maker = Callable[[Document], Section | None]
+_RESULTS: tuple[_Maker, ...] = (
     accuracy.comparison_section, accuracy.loss_section, accuracy.distance_section, timing.latency_section,
-    timing.outcomes_section, accuracy.classes_section, origin.space_section, origin.unmeasured_section,
-    origin.input_section, origin.identity_section, origin.reproduce_section,
+    timing.outcomes_section, accuracy.classes_section,
 )  # fmt: skip
-_STRIP_BEHIND = "Classes"
+_BASIS: tuple[_Maker, ...] = (
+    origin.space_section, origin.unmeasured_section, origin.input_section, origin.identity_section,
+    origin.reproduce_section,
+)  # fmt: skip
 
 
 def outline(document: Document, pictures: frozenset[str], strip_pass: str = "offline") -> Outline:
@@ -22,10 +25,8 @@ def outline(document: Document, pictures: frozenset[str], strip_pass: str = "off
         pictures: names of the pictures that were drawn; the others are left out.
         strip_pass: which pass the answers in the strip come from.
     """
-    sections = [section for make in _SECTIONS if (section := make(document)) is not None]
-    if "strip" in pictures:
-        at = next((i + 1 for i, s in enumerate(sections) if s.title == _STRIP_BEHIND), len(sections) - 3)
-        sections.insert(max(at, 0), _strip(strip_pass))
+    makers = (*_RESULTS, *([lambda _: _strip(strip_pass)] if "strip" in pictures else []), *_BASIS)
+    sections = [section for make in makers if (section := make(document)) is not None]
     return Outline(
         title=headline.report_title(document),
         state=document.state,

@@ -9,6 +9,7 @@ from markupsafe import Markup, escape
 
 from stsem.report.outline import Block, Outline
 from stsem.report.plots.gallery import Picture
+from stsem.report.plots.style import MODE_COLOURS
 
 
 def html(report: Outline, pictures: Mapping[str, Picture]) -> str:
@@ -25,7 +26,7 @@ def html(report: Outline, pictures: Mapping[str, Picture]) -> str:
         keep_trailing_newline=True,
     )
     environment.filters.update(
-        inline=_inline, kind=_kind, is_words=_is_words, picture=lambda name: _picture(pictures[name])
+        inline=_inline, kind=_kind, is_words=_is_words, swatch=_swatch, picture=lambda name: _picture(pictures[name])
     )
     return environment.get_template("template.html").render(report=report)
 
@@ -38,6 +39,13 @@ def _inline(text: str) -> Markup:
     """`code` and **bold** as in Markdown; everything else is text."""
     marked = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)))
     return Markup(re.sub(r"\*\*([^*]+)\*\*", r"<strong>\1</strong>", marked))
+
+
+def _swatch(name: str) -> Markup:
+    """A square in the colour of a mode before its name; other names as they are."""
+    if name not in MODE_COLOURS:
+        return _inline(name)
+    return Markup('<i class="swatch {0}"></i>{0}').format(name)
 
 
 def _is_words(cell: str) -> bool:

@@ -76,6 +76,7 @@ class ReportInputs:
         strip: up to about five frames worth looking at.
         strip_pass: which pass the strip's answers come from: `offline`, `delivered` or `streaming`.
         trace: bytes of trace.json; None without a clock.
+        answer_classes: classes of the answers where the log has no class table; None where it has.
         trajectory: bytes of trajectory.txt; None without poses.
         point_cloud: the finished map.ply, copied into the folder; None without a map.
         plots: whether pictures are drawn (`--no-plots`).
@@ -87,6 +88,7 @@ class ReportInputs:
     strip_pass: str = "offline"
     trace: bytes | None = None
     trajectory: bytes | None = None
+    answer_classes: ClassSet | None = None
     point_cloud: Path | None = None
     plots: bool = True
 
@@ -96,6 +98,6 @@ class ReportInputs:
 
     @property
     def class_set(self) -> ClassSet | None:
-        """The log's classes; None without a class table."""
+        """The log's classes, else those of the answers; None without either."""
         names, colours = self.document.input.classes, self.document.input.colours
-        return ClassSet(names, colours) if names else None
+        return ClassSet(names, colours) if names else self.answer_classes

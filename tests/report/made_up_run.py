@@ -7,6 +7,7 @@ import numpy as np
 from made_up_pictures import CLASSES, strip_frame
 
 from stsem.chance import generator
+from stsem.classes import ClassSet
 from stsem.document.accuracy import Coverage, DistanceRow, DistanceSummary, Loss, LossParts, Score
 from stsem.document.canonical import sealed
 from stsem.document.origin import Channel, Host, Identity, Input, LogInput, StageCost
@@ -23,7 +24,7 @@ COST_MS = {"register": (8.0, 11.0), "segment": (150.0, 195.0), "propagate": (4.5
 
 def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pictures: bool = True) -> ReportInputs:
     """Inputs of a report; without truth, from a damaged log, or without a clock."""
-    simulated = {mode: _schedule(mode, lossy) for mode in MODES}
+    simulated = {mode: _schedule(mode, lossy) if clock else _offline(_schedule(mode, lossy)) for mode in MODES}
     rows = tuple(_with_accuracy(mode, result, truth) for mode in MODES for result in simulated[mode])
     runs = tuple(_run(mode, [row for row in rows if row.mode == mode], truth, clock) for mode in MODES)
     document = Document(
@@ -49,12 +50,19 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
         },
         runs=runs,
         comparison=_comparison(runs, truth, clock),
-        warnings=("The cost profile was measured while other work held a core; latencies may be too long.",),
+        warnings=("The labels carry log times only; they are taken as stamps.",),
         host=_host(),
     )
     strip = tuple(strip_frame(i, truth) for i in (12, 47, 90, 131)) if pictures else ()
     trace = b'{"traceEvents":[]}\n' if clock else None
-    return ReportInputs(sealed(document), rows, strip, trace=trace, trajectory=b"# stamp x y z qx qy qz qw\n")
+    return ReportInputs(
+        sealed(document),
+        rows,
+        strip,
+        trace=trace,
+        trajectory=b"# stamp x y z qx qy qz qw\n",
+        answer_classes=ClassSet(CLASSES),
+    )
 
 
 @dataclass
@@ -98,6 +106,14 @@ def _schedule(mode: str, lossy: bool) -> list[FrameResult]:
         outcome = Outcome.SEGMENTED if segment else Outcome.PROPAGATED
         results.append(FrameResult(i, stamp, arrival, taken, answered, outcome, keyframe, reason, 0.97, tuple(spans)))
     return results
+
+
+def _offline(results: list[FrameResult]) -> list[FrameResult]:
+    return [
+        replace(r, arrival_ns=None, taken_ns=None, answered_ns=None, spans=(), outcome=Outcome.PROPAGATED
+                if r.outcome is Outcome.DROPPED_BUSY else r.outcome, keyframe=r.keyframe or 0)
+        for r in results
+    ]  # fmt: skip
 
 
 def _with_accuracy(mode: str, result: FrameResult, truth: bool) -> FrameRow:

@@ -43,7 +43,7 @@ def draw_all(inputs: ReportInputs) -> dict[str, Picture]:
         return {}
     with look():
         return {
-            name: Picture(name, png(figure), None if name in _PHOTOGRAPHS else svg(figure))
+            name: Picture(name, png(figure), None if name in _PHOTOGRAPHS else svg(figure, name))
             for name, draw in DRAWERS.items()
             if (figure := draw(inputs)) is not None
         }

@@ -27,7 +27,7 @@ def draw(inputs: ReportInputs) -> Figure | None:
     axes.set_xlabel("Latency from arrival, ms of simulated time")
     axes.set_ylabel("Frames answered, %")
     below = "Share of all frames of the log; what is missing to 100 % was never answered. Dots: medians of the answers."
-    title(axes, "Frames answered within a time", below)
+    title(axes, "Frames answered within a given latency", below)
     return figure
 
 

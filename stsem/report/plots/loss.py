@@ -30,8 +30,8 @@ def draw(inputs: ReportInputs) -> Figure | None:
     axes.grid(visible=False, axis="x")
     title(
         axes,
-        "Where the mIoU is lost",
-        "Each step takes its part away; below the name, the score that is left after it.",
+        "mIoU left after each part of the loss",
+        "In brackets: the score that is left after the step. Figures: points lost in the step.",
     )
     return figure
 

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 INK, MUTED, GRID, SURFACE = "#1f2328", "#5b636c", "#d8dee4", "#ffffff"
+BAD = "#b42318"
 WHITE, BLACK = "#fffffe", "#1f2327"
 """On coloured areas, the same in the light and the dark theme."""
 
@@ -90,27 +91,35 @@ def legend_beside_title(axes: Axes, entries: int) -> None:
 
 
 def png(figure: Figure) -> bytes:
-    """The picture as PNG, without dates."""
+    """The picture as PNG, without dates; the layout found for it stays."""
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=_PNG_DPI, metadata={"Software": None})
+    figure.set_layout_engine("none")
     return out.getvalue()
 
 
-_THEMED = {INK: "ink", MUTED: "muted", GRID: "grid", SURFACE: "surface"} | {
+_THEMED = {INK: "ink", MUTED: "muted", GRID: "grid", SURFACE: "surface", BAD: "bad"} | {
     colour: f"mode-{mode}" for mode, colour in MODE_COLOURS.items()
 }
 
 
-def svg(figure: Figure) -> str:
-    """The picture as an `<svg>` element for HTML: real text, colours that follow the page's light or dark theme."""
+def svg(figure: Figure, name: str) -> str:
+    """The picture as an `<svg>` element for HTML: real text, colours that follow the page's light or dark theme.
+
+    `name` keeps the ids of several pictures on one page apart.
+    """
     out = io.StringIO()
-    figure.savefig(out, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    with mpl.rc_context({"svg.hashsalt": f"stsem-{name}"}):
+        figure.savefig(
+            out, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        )
     text = out.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
-    text = re.sub(r' id="[a-z]+[0-9]*_[0-9_]+"', "", text)
+    used = set(re.findall(r'#([^")]+)[")]', text))
+    text = re.sub(r' id="([^"]+)"', lambda found: found[0] if found[1] in used else "", text)
     text = re.sub(r'<svg ([^>]*?)width="[^"]+" height="[^"]+"|<svg height="[^"]+" width="[^"]+"', r"<svg \1", text)
     text = re.sub(r"font: ([^;\"]*?)'DejaVu Sans'[^;\"]*", r"font: \1system-ui, sans-serif", text)
-    for colour, name in _THEMED.items():
-        text = text.replace(f": {colour}", f": var(--{name}, {colour})")
+    for colour, variable in _THEMED.items():
+        text = text.replace(f": {colour}", f": var(--{variable}, {colour})")
     return text

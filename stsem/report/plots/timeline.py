@@ -7,14 +7,14 @@ from matplotlib.patches import Patch
 
 from stsem.report.frames_csv import stages_of
 from stsem.report.inputs import FrameRow, ReportInputs
-from stsem.report.plots.style import BLACK, INK, STAGE_COLOURS, UNKNOWN_STAGE, WHITE, new_figure
+from stsem.report.plots.style import BAD, BLACK, INK, STAGE_COLOURS, SURFACE, UNKNOWN_STAGE, WHITE, new_figure
 from stsem.result import Outcome, Span
 
 FRAMES_SHOWN = 25
 _CORE_HEIGHT = 0.82
 _MARKS = {
     Outcome.SEGMENTED: ("s", STAGE_COLOURS["segment"]), Outcome.PROPAGATED: ("o", STAGE_COLOURS["propagate"]),
-    Outcome.DROPPED_BUSY: ("x", "#c1121f"), Outcome.NO_SOURCE: ("v", "#c1121f"), Outcome.PENDING: (">", "#c1121f"),
+    Outcome.DROPPED_BUSY: ("x", BAD), Outcome.NO_SOURCE: ("v", BAD), Outcome.PENDING: (">", BAD),
 }  # fmt: skip
 _DARK = ("segment", "fuse", "track")
 _WORDS = {Outcome.DROPPED_BUSY: "dropped", Outcome.NO_SOURCE: "no source"}
@@ -70,7 +70,7 @@ def _job(axes: Axes, span: Span, end_ms: float) -> None:
         [(start, length)],
         (bottom, height),
         facecolors=colour,
-        edgecolors=WHITE,
+        edgecolors=SURFACE,
         linewidth=0.6 if length > 0.008 * end_ms else 0.0,
     )
     if length > 0.018 * end_ms:

@@ -42,7 +42,7 @@ def _comparison(comparison: Comparison) -> Table:
     notes = (
         "Differences are paired: the same frames in both modes; a frame that one mode dropped stays in, as all wrong. "
         "Intervals: block bootstrap over stretches of the log; `no clear difference` where the interval holds 0.",
-        *score_meanings(),
+        *(score_meanings() if any(row.unit == "fraction" for row in comparison.rows) else ()),
     )
     return Table(columns, rows, notes)
 

@@ -15,12 +15,9 @@ def latency_section(document: Document) -> Section | None:
     runs = [run for run in document.runs if run.latency_ms]
     if not runs:
         return None
-    inside = Items(
-        tuple(f"`{run.mode}`: the latency contains {', '.join(run.stages_inside) or 'no stage'}." for run in runs)
-    )
     return Section(
         "Latency and throughput",
-        (Figure("latency", "share of frames answered within a latency, by mode"), _latencies(runs), inside,
+        (Figure("latency", "share of frames answered within a latency, by mode"), _latencies(runs),
          _stages(runs), _throughput(runs), Figure("timeline", "jobs on the two simulated cores")),
     )  # fmt: skip
 
@@ -33,6 +30,7 @@ def _latencies(runs: list[Run]) -> Table:
         for run in runs
     ]
     notes = (
+        *(f"The latency of `{run.mode}` contains {', '.join(run.stages_inside)}." for run in runs),
         *(f"{kind.replace('_', ' ').capitalize()}: {meaning(Latency, kind)}" for kind in _KINDS),
         "Percentile p = sorted[ceil(p n) - 1], not interpolated; given from 11, 64, 130, 662 and 6636 samples on "
         "(the smaller of frames and distinct samples of the slowest stage's profile), otherwise `n too small`.",

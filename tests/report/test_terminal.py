@@ -1,0 +1,35 @@
+"""The closing table says what was measured, and in words what was not."""
+
+from made_up_run import example
+
+from stsem.document.canonical import canonical
+from stsem.report.terminal import closing_table, summary
+
+
+def test_closing_table_is_short_and_complete() -> None:
+    lines = closing_table(example(pictures=False).document).splitlines()
+    assert max(len(line) for line in lines[:-1]) <= 100
+    words = {line.split("  ")[0]: line.split() for line in lines}
+    assert words["mIoU streaming, %"][3:] == ["59.9", "70.4", "+10.6", "[+9.4,", "+12.1]"]
+    assert words["latency p95, ms"][3:] == ["n", "too", "small", "187.1"]
+    assert words["frames dropped"][2:] == ["62", "3"]
+    assert words["keyframes"][1:] == ["88", "24"]
+    assert lines[-1].startswith("Accuracy over 150 of 150 frames (150 with truth), 11 classes averaged.")
+
+
+def test_without_truth_it_says_so() -> None:
+    table = closing_table(example(pictures=False, truth=False).document)
+    assert "Accuracy was not measured: the log has no channel with labels." in table
+    assert "nan" not in table.lower()
+
+
+def test_offline_has_no_latency() -> None:
+    assert "Offline: no clock, so no latency." in closing_table(example(pictures=False, clock=False).document)
+
+
+def test_summary_is_small_json() -> None:
+    document = example(pictures=False).document
+    found = summary(document)
+    assert found["digest"] == document.digest
+    assert found["runs"][1]["streaming"]["classes_averaged"] == 11  # type: ignore[index, call-overload]
+    assert len(canonical(found)) < 5000

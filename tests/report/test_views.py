@@ -1,0 +1,167 @@
+"""Markdown and HTML: one outline, every number with its basis, nothing blank."""
+
+import re
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from made_up_run import example
+
+from stsem.report.contents import outline
+from stsem.report.html import html
+from stsem.report.inputs import ReportInputs
+from stsem.report.markdown import markdown
+from stsem.report.outline import Section, Table
+from stsem.report.plots.gallery import Picture, draw_all
+
+VARIANTS = {"full": {}, "no truth": {"truth": False}, "lossy": {"lossy": True}, "offline": {"clock": False}}
+
+
+@pytest.fixture(scope="module", params=VARIANTS)
+def views(request: pytest.FixtureRequest) -> tuple[ReportInputs, str, str]:
+    inputs = example(pictures=False, **VARIANTS[request.param])
+    pictures = {name: Picture(name, b"png", f"<svg>{name}</svg>") for name in ("loss", "classes", "latency")}
+    report = outline(inputs.document, frozenset(pictures))
+    return inputs, markdown(report), html(report, pictures)
+
+
+class Checker(HTMLParser):
+    """Counts what must not be there, and whether every tag is closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: set[str] = set()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self.ids += [value or "" for key, value in attrs if key == "id"]
+        self.links += [value or "" for key, value in attrs if key in ("href", "src", "xlink:href")]
+        if tag not in ("meta", "br", "img", "link"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open
+        assert self.open.pop() == tag
+
+
+def check(page: str) -> Checker:
+    checker = Checker()
+    checker.feed(page)
+    assert checker.open == []
+    return checker
+
+
+def test_views_have_no_blank_and_no_nan(views: tuple[ReportInputs, str, str]) -> None:
+    _, text, page = views
+    for view in (text, page):
+        assert not re.search(r"\b(nan|None|null)\b", view)
+    for line in text.splitlines():
+        if line.startswith("|") and "sum" not in line:
+            assert "||" not in line
+
+
+def test_html_is_one_file_without_scripts(views: tuple[ReportInputs, str, str]) -> None:
+    found = check(views[2])
+    assert found.tags.isdisjoint({"script", "link", "iframe"})
+    assert all(link.startswith(("#", "data:")) for link in found.links)
+    assert len(found.ids) == len(set(found.ids))
+    assert {link[1:] for link in found.links if link.startswith("#")} <= set(found.ids)
+
+
+def test_state_and_accuracy_stand_at_the_top(views: tuple[ReportInputs, str, str]) -> None:
+    inputs, text, page = views
+    head = text.split("## ")[0]
+    document = inputs.document
+    assert document.digest[:12] in head
+    assert f"accuracy {document.accuracy_state}" in head
+    assert document.verdict.text in head
+    for reason in document.state_reasons:
+        assert reason in head
+        assert reason in page
+    if document.accuracy_state == "measured":
+        assert "150 of 150 frames (150 have truth); mIoU averages the 11 classes" in head
+    else:
+        assert "Accuracy was not measured: the log has no channel with labels." in head
+
+
+def test_outcomes_sum_stands_beside_the_frames(views: tuple[ReportInputs, str, str]) -> None:
+    text = views[1]
+    assert re.search(r"\*\*sum\*\* +\| +\*\*150\*\* \| +\*\*150\*\* \|", text)
+    assert re.search(r"\*\*frames of the log\*\* +\| +\*\*150\*\* \| +\*\*150\*\* \|", text)
+
+
+def test_both_views_say_the_same(views: tuple[ReportInputs, str, str]) -> None:
+    """Every section and every cell of Markdown is in HTML too."""
+    _, text, page = views
+    plain = re.sub(r"<[^>]+>", "", page).replace("&#39;", "'").replace("&lt;", "<").replace("&gt;", ">")
+    for title in re.findall(r"^## (.+)$", text, flags=re.MULTILINE):
+        assert f"<h2>{title}</h2>" in page
+    for row in re.findall(r"^\|(?!:|-)(.+)\|$", text, flags=re.MULTILINE):
+        for cell in row.split("|"):
+            assert cell.strip().replace("`", "").replace("*", "") in plain
+
+
+def test_reading_order_and_basis() -> None:
+    """From the verdict down; every table of scores has notes that define them."""
+    report = outline(example(pictures=False).document, frozenset({"strip"}))
+    titles = [section.title for section in report.sections]
+    wanted = ["Comparison", "Where the mIoU is lost", "By distance to the keyframe", "Latency and throughput",
+              "What became of the frames", "Classes", "Frames", "Not measured", "Input", "Reproduce"]  # fmt: skip
+    assert all(titles.index(a) < titles.index(b) for a, b in pairwise(wanted))
+    first: Section = report.sections[0]
+    table = first.blocks[0]
+    assert isinstance(table, Table)
+    assert any("Mean of the IoU over the classes that have truth pixels" in note for note in table.notes)
+    assert [tile.value for tile in report.tiles] == ["70.4 %", "77.4 %", "16.1 ms", "9.92 Hz"]
+    assert [tile.good for tile in report.tiles] == [True, False, True, True]
+
+
+def test_text_from_the_log_cannot_break_the_page() -> None:
+    inputs = example(pictures=False)
+    log = inputs.document.input.logs[0].model_copy(update={"name": "<script>alert(1)</script>|x"})
+    document = inputs.document.model_copy(update={"input": inputs.document.input.model_copy(update={"logs": (log,)})})
+    report = outline(document, frozenset())
+    assert check(html(report, {})).tags.isdisjoint({"script"})
+    assert "\\|x" in markdown(report)
+
+
+def test_a_single_mode_is_reported_without_comparison() -> None:
+    inputs = example(pictures=False)
+    document = inputs.document.model_copy(update={"runs": inputs.document.runs[:1], "comparison": None})
+    text = markdown(outline(document, frozenset()))
+    assert "## Result" in text
+    assert "`per-frame`: streaming mIoU 59.9 %; mean latency 218.1 ms; 88 of 150 frames answered." in text
+
+
+def test_drawn_pictures_stand_inline_and_follow_the_theme(written: Path) -> None:
+    page = (written / "report.html").read_text()
+    assert "xlink:href" in page
+    drawn = re.findall(r"<svg .*?</svg>", page, flags=re.DOTALL)
+    assert len(drawn) == 6
+    assert page.count("data:image/png;base64,") == 1
+    for picture in drawn:
+        check(picture)
+        assert "<metadata" not in picture
+        assert "var(--ink, #1f2328)" in picture
+    found = check(page)
+    assert len(found.ids) == len(set(found.ids))
+
+
+def test_png_has_no_date(written: Path) -> None:
+    for path in (written / "plots").iterdir():
+        data = path.read_bytes()
+        assert data.startswith(b"\x89PNG")
+        assert b"tIME" not in data
+        assert b"tEXt" not in data
+
+
+def test_pictures_are_left_out_where_there_is_nothing_to_show() -> None:
+    assert list(draw_all(example(truth=False))) == ["latency", "timeline", "strip"]
+    assert "latency" not in draw_all(example(truth=False, clock=False, pictures=False))
