@@ -32,11 +32,12 @@ def measure(
     from stsem.replay.costing import calibration_frames, subject
     from stsem.replay.engine import can_map
 
-    config = RunConfig(model=model, propagation=propagation, backend=backend, precision=precision)
+    config = RunConfig(model=model, propagation=propagation, backend=backend, precision=precision, count_decode=True)
     with open_log([log]) as opened:
-        frames = calibration_frames(opened, fused=can_map(opened, config))
-        wanted = subject(config, build_model(opened, config), cores=(1, 2))
-    profile = calibrate(wanted, frames, samples=samples, limit_ns=round(seconds * 1e9))
+        fused = can_map(opened, config)
+        frames = calibration_frames(opened, fused=fused)
+        wanted = subject(opened, config, build_model(opened, config), cores=(1, 2), fused=fused)
+        profile = calibrate(wanted, frames, samples=samples, limit_ns=round(seconds * 1e9))
     profile.save(out)
     for stage, times in profile.samples_ns.items():
         print(f"{stage:14} median {times[len(times) // 2] / 1e6:8.2f} ms of {len(times)} samples")

@@ -12,7 +12,7 @@ from stsem.replay.engine import ModeRun, Replayed
 from stsem.replay.record import Record
 from stsem.replay.runs import Context
 from stsem.report.inputs import FrameRow, ReportInputs, StripFrame
-from stsem.result import FrameResult, Span
+from stsem.result import Span
 from stsem.sim.trace import RunTrace, marks_of, trace_bytes
 
 MAX_POSE_GAP_NS = 150_000_000
@@ -53,7 +53,7 @@ def _rows(run: ModeRun, replayed: Replayed) -> list[FrameRow]:
             log_stamp_ns=stamps[result.index],
             offline_keyframe=sources.get(result.index),
             offline=offline.get(result.index),
-            delivered=_delivered(own, result),
+            delivered=own.get(result.index),
             streaming=streaming.get(result.index),
         )
         for result in record.results
@@ -62,10 +62,6 @@ def _rows(run: ModeRun, replayed: Replayed) -> list[FrameRow]:
 
 def _accuracies(record: Record | None) -> dict[int, float]:
     return {} if record is None or record.scorecard is None else record.scorecard.pixel_accuracy()
-
-
-def _delivered(own: dict[int, float], result: FrameResult) -> float | None:
-    return own.get(result.index) if result.outcome.is_answer else None
 
 
 def _strip(replayed: Replayed) -> tuple[StripFrame, ...]:

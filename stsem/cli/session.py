@@ -4,6 +4,8 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from stsem import hostclock
@@ -13,16 +15,19 @@ from stsem.document.canonical import to_bytes
 from stsem.document.difference import first_differences, repeatable_files
 from stsem.document.origin import Host
 from stsem.document.schema import Document
-from stsem.errors import NotRepeatableError
+from stsem.errors import NotRepeatableError, UsageError
 from stsem.log.log import Log, open_log
-from stsem.replay.build import Model, build_model
+from stsem.replay.build import Model, build_model, truth_frames
 from stsem.replay.config import RunConfig
 from stsem.replay.costing import Costing, costing
 from stsem.replay.documents import build_document
 from stsem.replay.engine import can_map, replay_log
 from stsem.replay.runs import Context
+from stsem.replay.timing import deadline_ns
 from stsem.report.folder import check_target, folder_name, write_folder
 from stsem.report.terminal import closing_table
+from stsem.search.probe import Probe
+from stsem.search.sustainable import search
 
 REPORTS = Path("reports")
 
@@ -81,7 +86,23 @@ def _replay(session: Session, began_ns: int, label: str) -> Context:
     log, config, model, costs = session.log, session.config, session.model, session.costing
     with progress(label) as step:
         replayed = replay_log(log, config, model, None if costs is None else costs.of, step)
-    return Context(log, config, model, costs, replayed)
+    return Context(log, config, model, costs, replayed, _sustainable(session))
+
+
+def _sustainable(session: Session) -> dict[str, float | None]:
+    """Mode -> the highest rate it sustains, in frames per second, where that was asked for."""
+    log, config, costs = session.log, session.config, session.costing
+    if not config.sustainable or costs is None:
+        return {}
+    if costs.sha256 is None:
+        raise UsageError("--sustainable needs durations that repeat; give --costs auto or a file instead of measured.")
+    usable = truth_frames(log) if config.is_oracle else None
+    probe = Probe(log, config, costs.of, fused=session.fused, usable=usable)
+    deadline = deadline_ns(config.deadline_ms, log.period_ns, Fraction(1))
+    return {
+        mode.name: search(partial(probe.attempt, mode), capture_hz=1e9 / log.period_ns, deadline_ns=deadline).hz
+        for mode in config.modes
+    }
 
 
 def _write(session: Session, out: Path | None, began_ns: int) -> tuple[Document, Path]:

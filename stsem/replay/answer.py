@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from stsem.frame import Frame, Segmentation
 from stsem.stages.keyframe import Keyframe
 from stsem.stages.propagate import Propagation
-from stsem.stages.register import Register, Registration
+from stsem.stages.register import Registering, Registration
 from stsem.stages.segment import Segmenter
 from stsem.stages.select import Candidate, KeyframePolicy, Motion
 
@@ -28,7 +28,7 @@ class Prediction:
 
     policy: KeyframePolicy
     method: Propagation
-    register: Register | None
+    register: Registering | None
 
 
 class AnswerRule:

@@ -34,6 +34,7 @@ class Subject:
         network_cores: core counts to measure the network with.
         propagation: the method between keyframes.
         seed: of registration.
+        decode: decodes some frame of the log anew; None to leave decoding out.
     """
 
     network: Network
@@ -42,6 +43,7 @@ class Subject:
     network_cores: tuple[int, ...]
     propagation: Propagation
     seed: int
+    decode: Callable[[], object] | None = None
 
 
 def measure(subject: Subject, frames: list[Frame], *, samples: int = SAMPLES, limit_ns: int = LIMIT_NS) -> CostProfile:
@@ -84,6 +86,8 @@ def _stages(subject: Subject, frames: list[Frame]) -> Iterator[tuple[str, int, C
     fuse, labels = Fuse(LabelledCloud()), answer
     yield "register", 1, lambda frame: register(frame, features, frames[0].index)
     yield "propagate", 1, lambda frame: subject.propagation.propagate(keyframe, frame, last)
+    if (decode := subject.decode) is not None:
+        yield "decode", 1, lambda frame: decode()
     if any(fuse.can_fuse(frame) for frame in frames):
         yield "fuse", 1, lambda frame: fuse(frame, labels)
 

@@ -2,13 +2,15 @@
 
 import contextlib
 import hashlib
+import importlib.metadata
+import itertools
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from stsem import hostclock
-from stsem.errors import CostError, UsageError
+from stsem.errors import CostError, DecodeError, OutputError, UsageError
 from stsem.frame import Frame
 from stsem.inference.cache import cache_root
 from stsem.inference.network import DEFAULT, Network, load_network
@@ -23,6 +25,7 @@ from stsem.sim.trace import is_trace, read_durations
 from stsem.stages.propagate import PROPAGATIONS
 
 _CALIBRATION_FRAMES = 12
+_DECODED_FRAMES = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +78,12 @@ def _of_profile(name: str, profile: CostProfile, log: Log, config: RunConfig) ->
     return Costing(name, lambda mode: source, profile.sha256, profile)
 
 
-def subject(config: RunConfig, model: Model, cores: tuple[int, ...]) -> Subject:
+def subject(log: Log, config: RunConfig, model: Model, cores: tuple[int, ...], *, fused: bool) -> Subject:
     """What a profile for this configuration must hold; `cores`: how many the network may claim."""
     network: Network = model.network or load_network(DEFAULT)
+    decode = _decoder(log, fused) if config.count_decode else None
     return Subject(
-        network, config.backend, config.precision, cores, PROPAGATIONS[config.propagation](), config.seed
+        network, config.backend, config.precision, cores, PROPAGATIONS[config.propagation](), config.seed, decode
     )  # fmt: skip
 
 
@@ -102,20 +106,51 @@ def calibration_frames(log: Log, *, fused: bool) -> list[Frame]:
 
 def _calibrated(log: Log, config: RunConfig, model: Model, fused: bool, say: Callable[[str], None]) -> CostProfile:
     cores = tuple(sorted({min(mode.network_cores, config.cores) for mode in config.modes}))
-    wanted = subject(config, model, cores)
+    wanted = subject(log, config, model, cores, fused=fused)
     frames = calibration_frames(log, fused=fused)
     about = {
         "machine": hostclock.machine_name(), "network": wanted.network.sha256, "size": frames[0].size,
         "backend": [wanted.backend, wanted.precision], "cores": wanted.network_cores,
-        "propagation": config.propagation, "fused": fused,
+        "propagation": config.propagation, "fused": fused, "decode": config.count_decode,
+        "onnxruntime": importlib.metadata.version("onnxruntime"),
     }  # fmt: skip
     digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:16]
     path = cache_root() / "costs" / f"{digest}.json"
-    if config.cache and path.is_file():
-        return load_profile(path)
+    if config.cache and (kept := _kept(path)) is not None:
+        return kept
     say("Measuring what the stages cost on this machine (once; kept in the cache folder) ...")
     profile = measure(wanted, frames)
     if config.cache:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        profile.save(path)
+        _keep(profile, path)
     return profile
+
+
+def _kept(path: Path) -> CostProfile | None:
+    """The profile of an earlier run; None when there is none, or when it is damaged."""
+    try:
+        return load_profile(path) if path.is_file() else None
+    except CostError:
+        return None
+
+
+def _keep(profile: CostProfile, path: Path) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as err:
+        raise OutputError(
+            f"The cache folder {path.parent} cannot be made ({err.strerror}); set STSEM_CACHE, or use --no-cache."
+        ) from err
+    profile.save(path)
+
+
+def _decoder(log: Log, fused: bool) -> Callable[[], object]:
+    """Decodes the frames of the log in turn, so far apart in time that none is still in memory."""
+    supply = itertools.cycle([plan.index for plan in log.plans][:_DECODED_FRAMES])
+
+    def decode() -> object:
+        try:
+            return log.frame(next(supply), depth=fused, previous=False)
+        except DecodeError:
+            return None
+
+    return decode

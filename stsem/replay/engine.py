@@ -148,7 +148,8 @@ def _machine(mode: Mode, config: RunConfig, costs: CostSource, cloud: LabelledCl
     capacity, newest_wins = parse_queue(config.queue)
     return Machine(
         cores=config.cores, network_cores=min(mode.network_cores, config.cores), costs=costs,
-        mailbox=Mailbox(capacity, newest_wins), fuse=None if cloud is None else Fuse(cloud), decode=None,
+        mailbox=Mailbox(capacity, newest_wins), fuse=None if cloud is None else Fuse(cloud),
+        count_decode=config.count_decode,
     )  # fmt: skip
 
 

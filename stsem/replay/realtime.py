@@ -14,7 +14,7 @@ from stsem.result import FrameResult, Outcome, Span
 from stsem.sim.cores import CorePool, Job
 from stsem.sim.costs import CostSource
 from stsem.sim.events import EventQueue, Priority
-from stsem.stages.fuse import Fuse
+from stsem.stages.fuse import Fuser
 from stsem.stages.register import Registration
 
 T = TypeVar("T")
@@ -68,15 +68,15 @@ class Machine:
         costs: how long jobs last.
         mailbox: the queue rule.
         fuse: the map beside the path; None without one.
-        decode: re-decodes a frame as a job on the path (`--count-decode`); None to leave decoding out.
+        count_decode: whether decoding is a job on the path (`--count-decode`); the work itself is done before.
     """
 
     cores: int
     network_cores: int
     costs: CostSource
     mailbox: Mailbox
-    fuse: Fuse | None = None
-    decode: Callable[[Frame], object] | None = None
+    fuse: Fuser | None = None
+    count_decode: bool = False
 
 
 @dataclass(eq=False)
@@ -157,11 +157,10 @@ class RealTimeRun:
             raise ValueError(f"frame {index} has no image and cannot be taken")
         task = _Task(self._slot(index), loaded, loaded.frame, self._queue.now_ns)
         self._state.task = task
-        if self._machine.decode is None:
-            self._register(task)
+        if self._machine.count_decode:
+            self._submit(task.frame, "decode", 1, lambda: None, lambda _: self._register(task))
         else:
-            decode = self._machine.decode
-            self._submit(task.frame, "decode", 1, lambda: decode(task.frame), lambda _: self._register(task))
+            self._register(task)
 
     def _register(self, task: _Task) -> None:
         def choose(registration: Registration | None) -> None:

@@ -1,7 +1,8 @@
 """From what one mode did to its part of the report."""
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from stsem.document.accuracy import Coverage, Loss
 from stsem.document.schema import MapScore, Run, TrajectoryScore
@@ -26,13 +27,14 @@ NO_OFFLINE = "--no-offline"
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What every mode of one report shares."""
+    """What every mode of one report shares; `sustainable_hz` by mode, where it was searched for."""
 
     log: Log
     config: RunConfig
     model: Model
     costing: Costing | None
     replayed: Replayed
+    sustainable_hz: Mapping[str, float | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,11 @@ def _timing(context: Context, run: ModeRun) -> tuple[Latency | None, Throughput 
     fast = throughput(
         results, run.spans, cores=config.cores, deadline_ns=deadline, rate=float(config.exact_rate)
     )  # fmt: skip
-    return timing.latency(late), timing.throughput(fast, deadline, None), timing.stages_inside(late.inside)
+    return (
+        timing.latency(late),
+        timing.throughput(fast, deadline, context.sustainable_hz.get(run.mode.name)),
+        timing.stages_inside(late.inside),
+    )
 
 
 def _distinct_samples(context: Context, run: ModeRun) -> int | None:
@@ -193,6 +199,8 @@ def _why_not(context: Context, found: Found) -> dict[str, str]:
         why["latency_ms"] = why["throughput"] = NO_CLOCK
     elif not config.sustainable:
         why["throughput.sustainable_hz"] = "not searched for (--sustainable)"
+    elif context.sustainable_hz.get(found.run.mode.name) is None:
+        why["throughput.sustainable_hz"] = "not even the lowest rate tried is sustained"
     if found.run.cloud is None:
         why["map"] = "--map off" if not config.map else "the log lacks depth, poses or camera intrinsics"
     if context.log.trajectory is None:

@@ -1,9 +1,20 @@
 """Fuse: the labelled points of keyframes, brought into the world by their poses (equation 3)."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from stsem.frame import Frame, Segmentation
 from stsem.mapping.cloud import LabelledCloud, backproject
+
+
+class Fuser(Protocol):
+    """What stands beside the answer path and takes in keyframes."""
+
+    def can_fuse(self, frame: Frame) -> bool:
+        """Whether the frame has what it needs."""
+
+    def __call__(self, frame: Frame, segmentation: Segmentation) -> None:
+        """Take in a keyframe."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Register: how the last selected keyframe maps onto this frame (equation 2)."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from stsem import chance
 from stsem.frame import Frame
@@ -17,6 +18,13 @@ class Registration:
 
     features: Features
     homography: Homography | None
+
+
+class Registering(Protocol):
+    """Registers a frame to a keyframe."""
+
+    def __call__(self, frame: Frame, keyframe: Features | None, keyframe_index: int | None) -> Registration:
+        """Features of `frame` and, if there is a keyframe, its homography to `frame`."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Searches over replays: the highest rate that the pipeline sustains."""
