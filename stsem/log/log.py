@@ -1,6 +1,6 @@
 """A recorded log, opened: what it is, how its frames are made, and random access to frames and truth."""
 
-from collections.abc import Callable, Iterable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -183,7 +183,9 @@ class Log:
             self._unknown_pixels[row] = unknown
         return labels
 
-    def frames(self, indices: Iterable[int], *, depth: bool, previous: bool, truth: bool) -> Generator[Loaded, None, None]:
+    def frames(
+        self, indices: Iterable[int], *, depth: bool, previous: bool, truth: bool
+    ) -> Generator[Loaded, None, None]:
         """The frames at `indices`, in that order, decoded ahead; nothing is left running however the loop ends."""
 
         def load(index: int) -> Loaded:

@@ -13,7 +13,9 @@ WORKERS = 2
 AHEAD = 4
 
 
-def prefetched(make: Callable[[K], T], keys: Iterable[K], workers: int = WORKERS, ahead: int = AHEAD) -> Generator[T, None, None]:
+def prefetched(
+    make: Callable[[K], T], keys: Iterable[K], workers: int = WORKERS, ahead: int = AHEAD
+) -> Generator[T, None, None]:
     """`make(key)` for each of `keys`, in order, with at most `ahead` results waiting.
 
     An exception of `make` is raised where its result would have come. However the iteration ends (exhausted, closed,
