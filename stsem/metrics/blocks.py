@@ -55,10 +55,10 @@ class Blocks:
 def autocorrelation_time(series: npt.NDArray[np.float64]) -> float:
     """Integrated autocorrelation time 1 + 2 sum rho(k) in samples, at least 1; NaN samples are left out.
 
-    Corrected by 1 + (2 M + 1) / n for the estimated mean (Wolff 2004, equation 49; M is the last lag). The saw-tooth
+    Corrected by 1 + (2 M + 1) / n for the estimated mean (Wolff 2004; M is the last lag). The saw-tooth
     that keyframes cut into a series hides slow changes under it, so the series is also looked at in means of 2, 4, 8,
     ... samples, as long as 24 of them are left; of each of these estimates half a standard error is taken off
-    (tau sqrt((4 M + 2) / n), Wolff 2004, equation 42), as the longest one counts. It errs on the long side.
+    (tau sqrt((4 M + 2) / n), Madras and Sokal 1988), as the longest one counts. It errs on the long side.
     """
     x = series[~np.isnan(series)]
     if len(x) < 2 or float(np.var(x)) < _NOTHING:

@@ -9,7 +9,7 @@ class Facts:
     """What a reader must know about a number.
 
     Args:
-        unit: `fraction`, `ms`, `Hz`, `frames`, `m`, `deg`, `1` (a plain ratio) or `voxels`.
+        unit: `fraction`, `ms`, `Hz`, `frames`, `m`, `deg`, `1` (a plain ratio), `points` or `voxels`.
         higher_is_better: None when neither is.
     """
 
@@ -45,6 +45,7 @@ CATALOGUE: tuple[tuple[str, Facts], ...] = (
     ("trajectory.tracked_share", _MORE),
     ("trajectory.*_m", Facts("m", False)),
     ("trajectory.*_deg", Facts("deg", False)),
+    ("map.points", Facts("points", None)),
     ("map.voxels", Facts("voxels", None)),
     ("map.outlier_share", _LESS),
     ("map.*", _MORE),

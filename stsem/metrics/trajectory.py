@@ -36,7 +36,7 @@ class RelativeErrors:
 
 
 def umeyama(source: npt.NDArray[np.float64], target: npt.NDArray[np.float64]) -> Pose:
-    """The rigid T (4, 4) that minimises sum |target - T source|^2 (Umeyama 1991, equations 34-42 with c = 1).
+    """The rigid T (4, 4) that minimises sum |target - T source|^2 (Umeyama 1991, equations 34-43 with c = 1).
 
     Args:
         source, target: (n, 3) positions, matched by row.
@@ -50,7 +50,7 @@ def umeyama(source: npt.NDArray[np.float64], target: npt.NDArray[np.float64]) ->
         )
     mean_source, mean_target = source.mean(axis=0), target.mean(axis=0)  # eq. 34, 35
     covariance = (target - mean_target).T @ (source - mean_source) / len(source)  # eq. 38
-    U, singular, Vt = np.linalg.svd(covariance)  # eq. 39
+    U, singular, Vt = np.linalg.svd(covariance)  # between eq. 38 and 39
     if np.count_nonzero(singular > 1e-12 * singular[0]) < 2:
         raise ValueError("an alignment needs points that do not lie on one line")
     S = np.diag([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])  # eq. 43

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from stsem.metrics.catalogue import CATALOGUE, facts
 from stsem.metrics.consistency import ConsistencyMeter, agreement, carried
 
 
@@ -53,17 +52,3 @@ def test_unlabelled_pixels_of_the_previous_answer_are_ignored() -> None:
     matrix = agreement(before, now, 2)
     assert matrix.sum() == 7 * 20
     assert matrix[:, 2].sum() == 20
-
-
-def test_every_number_has_unit_and_direction() -> None:
-    """Paths of the report find their facts; an unknown one is an error that lists the patterns."""
-    assert facts("offline.miou").higher_is_better
-    assert facts("strata.propagated.iou.wall").unit == "fraction"
-    assert facts("latency_ms.stages.segment.service.p95").unit == "ms"
-    assert facts("outcomes.dropped_busy").higher_is_better is False
-    assert facts("outcomes.propagated").higher_is_better is None
-    assert facts("throughput.output_hz").unit == "Hz"
-    assert facts("trajectory.ate_rmse_m").higher_is_better is False
-    with pytest.raises(ValueError, match="no number of a run is called 'vibes'"):
-        facts("vibes")
-    assert len({pattern for pattern, _ in CATALOGUE}) == len(CATALOGUE)
