@@ -70,7 +70,7 @@ def compare(contenders: list[Contender], seed: int) -> tuple[Comparison, ...]:
 
 def _scores(base: Contender, other: Contender, seed: int) -> list[ComparisonRow]:
     passes: dict[str, Callable[[Contender], Samples | None]] = {
-        "offline": lambda c: _own(c.offline), "delivered": lambda c: _own(c.real_time), "streaming": _streaming,
+        "offline": lambda c: _own(c.offline), "delivered_paired": lambda c: _own(c.real_time), "streaming": _streaming,
     }  # fmt: skip
     rows = []
     for name, samples_of in passes.items():

@@ -51,6 +51,9 @@ METRICS: dict[str, Metric] = {
     metric.path: metric
     for metric in [
         *_score("offline"), *_score("delivered"), *_score("streaming"),
+        Metric("delivered_paired.miou", "mIoU delivered, dropped = wrong, %", "fraction", Score, "miou"),
+        Metric("delivered_paired.pixel_accuracy", "pixel accuracy delivered, dropped = wrong, %", "fraction", Score,
+               "pixel_accuracy"),
         *(_latency(field) for field in ("p50", "p90", "p95", "p99", "max", "mean")),
         Metric("latency_ms.from_stamp.p50", "latency from stamp p50, ms", "ms", Latency, "from_stamp"),
         Metric("throughput.output_hz", "output rate, Hz", "Hz", Throughput, "output_hz"),
