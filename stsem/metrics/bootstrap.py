@@ -159,15 +159,22 @@ def _bootstrap(
         return NoInterval("no pixel with truth was judged")
     scores = [_Ratios(one, metric, class_set) for one in tallies]
     units = len(tallies[0])
-    counts = generator(seed, "bootstrap", units).multinomial(units, np.full(units, 1 / units), RESAMPLES)
+    counts = _draws(seed, units)
     value, error = _value_and_error(scores, np.ones((1, units)))
-    values, errors = _value_and_error(scores, counts.astype(np.float64))
+    values, errors = _value_and_error(scores, counts)
     spread = float(error[0]) * inflation**0.5
     low, high = _studentised(float(value[0]), spread, values, errors)
     if not (np.isfinite(low) and np.isfinite(high)):
         return NoInterval(f"too few of the {units} blocks differ from each other")
     floor = 0.0 if len(tallies) == 1 else -1.0
     return Interval(float(value[0]), max(low, floor), min(high, 1.0), spread, units, n)
+
+
+def _draws(seed: int, units: int) -> Floats:
+    """(RESAMPLES, units) how often each resample, `units` draws with replacement, holds each unit."""
+    drawn = generator(seed, "bootstrap", units).integers(units, size=(RESAMPLES, units))
+    cells = drawn + units * np.arange(RESAMPLES)[:, None]
+    return np.bincount(cells.ravel(), minlength=RESAMPLES * units).reshape(RESAMPLES, units).astype(np.float64)
 
 
 def _value_and_error(scores: Sequence[_Ratios], counts: Floats) -> tuple[Floats, Floats]:
