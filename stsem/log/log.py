@@ -108,6 +108,7 @@ class Log:
         self._translate = Translator(assembly.table) if assembly.table else None
         self._unknown_pixels: dict[int, int] = {}
         self._images: Recent[int, Image] = Recent(self._decode_image, IMAGES_KEPT)
+        self._truths: Recent[int, Labels | None] = Recent(self._decode_truth, IMAGES_KEPT)
         self._partners, inexact = _pair(assembly)
         self.camera: Camera | None = assembly.camera
         self.classes: ClassSet | None = assembly.table.classes if assembly.table else None
@@ -172,16 +173,7 @@ class Log:
         A label image that cannot be decoded is None and counted as damage.
         """
         row = int(self._partners.truth[self._first + index])
-        if row < 0 or self._labels is None or self._translate is None:
-            return None
-        translate = self._translate
-        try:
-            labels, unknown = self._labels.read(row, lambda message: translate(pixels.labels(message)))
-        except DecodeError:
-            return None
-        if unknown:
-            self._unknown_pixels[row] = unknown
-        return labels
+        return None if row < 0 else self._truths.get(row)
 
     def frames(
         self, indices: Iterable[int], *, depth: bool, previous: bool, truth: bool
@@ -202,6 +194,18 @@ class Log:
             return _of_size(pixels.colour(message), self._assembly.size, "the first image")
 
         return self._color.read(row, convert)
+
+    def _decode_truth(self, row: int) -> Labels | None:
+        if self._labels is None or self._translate is None:
+            return None
+        translate = self._translate
+        try:
+            labels, unknown = self._labels.read(row, lambda message: translate(pixels.labels(message)))
+        except DecodeError:
+            return None
+        if unknown:
+            self._unknown_pixels[row] = unknown
+        return labels
 
     def _previous(self, row: int) -> Image | None:
         """The image of the last row before `row` that can be decoded."""
