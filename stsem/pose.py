@@ -19,15 +19,21 @@ def from_quaternion(translation: npt.ArrayLike, quaternion: npt.ArrayLike) -> Po
     norm = float(np.linalg.norm(q))
     if not (np.isfinite(t).all() and np.isfinite(norm)) or norm < 1e-9:
         raise ValueError(f"not a pose: translation {t.tolist()}, quaternion {q.tolist()}")
-    x, y, z, w = q / norm
     pose = np.eye(4)
-    pose[:3, :3] = [
+    pose[:3, :3] = rotation(q / norm)
+    pose[:3, 3] = t
+    return pose
+
+
+def rotation(quaternion: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """R (..., 3, 3) of unit quaternions (..., 4) x y z w."""
+    x, y, z, w = np.moveaxis(quaternion, -1, 0)
+    rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    pose[:3, 3] = t
-    return pose
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def to_quaternion(pose: Pose) -> npt.NDArray[np.float64]:

@@ -23,14 +23,14 @@ class Row:
         kind: what it holds.
         reader: makes, once per channel and from the schema in the file, the reader of whole messages.
         stamp: makes the reader of the capture stamp alone; None when the whole message is read during the scan.
-        unstamped_tail: bytes at the front that hold the stamp and nothing else; a message that is equal behind them
-            says nothing new. None when that cannot be told from the bytes.
+        stamp_bytes: of a calibration: bytes at the front that hold the stamp; a message that is equal to the one before
+            behind them says nothing new and is not read again.
     """
 
     kind: Kind
     reader: Callable[[Schema], MessageReader]
     stamp: Callable[[Schema], StampReader] | None = None
-    unstamped_tail: int | None = None
+    stamp_bytes: int = 0
 
 
 def _header(_: Schema) -> StampReader:
@@ -43,7 +43,7 @@ TABLE: dict[tuple[str, str], Row] = {
     ("cdr", "sensor_msgs/msg/Image"): Row(Kind.IMAGE, ros2.image, _header),
     ("cdr", "sensor_msgs/msg/CompressedImage"): Row(Kind.COMPRESSED, ros2.compressed_image, _header),
     ("cdr", "sensor_msgs/msg/CameraInfo"): Row(
-        Kind.CALIBRATION, ros2.camera_info, _header, unstamped_tail=CDR_HEADER_STAMP
+        Kind.CALIBRATION, ros2.camera_info, _header, stamp_bytes=CDR_HEADER_STAMP
     ),
     ("cdr", "tf2_msgs/msg/TFMessage"): Row(Kind.TRANSFORMS, ros2.tf_message),
     ("cdr", "geometry_msgs/msg/PoseStamped"): Row(Kind.POSE, ros2.pose_stamped),

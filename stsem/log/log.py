@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
@@ -96,7 +97,6 @@ class Log:
     Attributes:
         classes: of the truth; None without labels or without a class table.
         camera: intrinsics of the colour images; None when the log has none.
-        trajectory: T_WC at the samples of the pose channel (of a chain of transforms: at the union of their stamps).
         plans: one per colour frame in the window, in order of index.
         period_ns: median distance of colour stamps.
     """
@@ -112,7 +112,6 @@ class Log:
         self._partners, inexact = _pair(assembly)
         self.camera: Camera | None = assembly.camera
         self.classes: ClassSet | None = assembly.table.classes if assembly.table else None
-        self.trajectory: Trajectory | None = self._poses.trajectory() if self._poses else None
         self.period_ns: int = median_period_ns(self._color.rows) or UNKNOWN_PERIOD_NS
         self.plans: tuple[FramePlan, ...] = _plans(assembly, self._partners, rows)
         if inexact:
@@ -130,6 +129,11 @@ class Log:
     def close(self) -> None:
         """Close the files."""
         self._store.close()
+
+    @cached_property
+    def trajectory(self) -> Trajectory | None:
+        """T_WC at the samples of the pose channel; of a chain of transforms: at the union of their stamps."""
+        return self._poses.trajectory() if self._poses else None
 
     @property
     def size(self) -> tuple[int, int]:

@@ -5,19 +5,19 @@ composed of its edges, each looked up at the stamp, as tf2 does it.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
 
 import numpy as np
 
-from stsem.log.messages import Transform
-from stsem.log.tracks import Int64, Track
-from stsem.pose import Pose, Trajectory, from_quaternion
+from stsem.log.tracks import Float64, Int64, Samples, Track
+from stsem.pose import Pose, Trajectory, rotation
 
 MAX_GAP_NS = 150_000_000
 MAX_DEPTH = 100
+MIN_QUATERNION = 1e-9
 STATIC_SUFFIX = "tf_static"
 
 
@@ -92,16 +92,21 @@ class PoseSource:
 
 
 def stamped_poses(track: Track) -> tuple[PoseSource | None, list[str]]:
-    """(source of a channel of poses, warnings); the pose is taken as that of the camera's optical frame."""
-    edge, bad = _edge(track.transforms)
-    warnings = (
-        [f"{bad} poses of {track.topic} are no poses (not finite, or a zero quaternion) and are left out."]
-        if bad
-        else []
-    )
+    """(source of a channel of poses, warnings); the pose is taken as that of the camera's optical frame.
+
+    Of poses in several frames, those in the frame with the most count.
+    """
+    warnings: list[str] = []
+    (parent, _), samples = max(track.transforms.items(), key=lambda item: (len(item[1]), item[0]))
+    if len(track.transforms) > 1:
+        frames = ", ".join(sorted(repr(frame) for frame, _ in track.transforms))
+        warnings.append(f"The poses of {track.topic} are in several frames ({frames}); those in {parent!r} are used.")
+    edge, bad = _edge(samples)
+    if bad:
+        warnings.append(f"{bad} poses of {track.topic} are no poses (not finite, or a zero quaternion): left out.")
     if edge is None:
         return None, warnings
-    return PoseSource(track.topic, (track.transforms[0][0].parent, "camera"), (edge,), by_chain=False), warnings
+    return PoseSource(track.topic, (parent, "camera"), (edge,), by_chain=False), warnings
 
 
 def transform_chain(tracks: Iterable[Track], camera_frame: str) -> tuple[PoseSource | None, list[str]]:
@@ -138,25 +143,22 @@ def is_static(track: Track) -> bool:
     return track.topic.rstrip("/").endswith(STATIC_SUFFIX)
 
 
-Samples = Sequence[tuple[Transform, int]]
 Pair = tuple[str, str]
 
 
-def _collect(
-    tracks: Iterable[Track],
-) -> tuple[dict[Pair, list[tuple[Transform, int]]], dict[Pair, list[tuple[Transform, int]]]]:
-    moving: dict[Pair, list[tuple[Transform, int]]] = defaultdict(list)
-    static: dict[Pair, list[tuple[Transform, int]]] = defaultdict(list)
+def _collect(tracks: Iterable[Track]) -> tuple[dict[Pair, Samples], dict[Pair, Samples]]:
+    """(moving, static) samples by pair; a pair that is on several channels is that of the one with most."""
+    moving: dict[Pair, Samples] = {}
+    static: dict[Pair, Samples] = {}
     for track in tracks:
         target = static if is_static(track) else moving
-        for transform, log_ns in track.transforms:
-            target[transform.parent, transform.child].append((transform, log_ns))
+        for pair, samples in track.transforms.items():
+            if pair not in target or len(samples) > len(target[pair]):
+                target[pair] = samples
     return moving, static
 
 
-def _parents(
-    moving: dict[Pair, list[tuple[Transform, int]]], static: dict[Pair, list[tuple[Transform, int]]]
-) -> tuple[dict[str, str], list[str]]:
+def _parents(moving: Mapping[Pair, Samples], static: Mapping[Pair, Samples]) -> tuple[dict[str, str], list[str]]:
     votes: dict[str, dict[str, int]] = defaultdict(dict)
     for (parent, child), samples in (*static.items(), *moving.items()):
         votes[child][parent] = votes[child].get(parent, 0) + len(samples)
@@ -168,7 +170,7 @@ def _parents(
     return parents, warnings
 
 
-def _chain(parents: dict[str, str], frame: str) -> tuple[tuple[str, ...], bool]:
+def _chain(parents: Mapping[str, str], frame: str) -> tuple[tuple[str, ...], bool]:
     """(frames from the root down to `frame`, whether they run in a circle)."""
     frames = [frame]
     while (parent := parents.get(frames[-1])) is not None:
@@ -180,23 +182,27 @@ def _chain(parents: dict[str, str], frame: str) -> tuple[tuple[str, ...], bool]:
 
 def _static_edge(samples: Samples) -> tuple[Edge | None, int]:
     """The last static transform of a pair holds."""
-    edge, bad = _edge(samples[-1:])
-    return (Edge(edge.trajectory, edge.log_ns, static=True) if edge else None), bad
+    stamps, logs, poses, bad = _good(samples)
+    if not len(stamps):
+        return None, bad
+    return Edge(Trajectory(stamps[-1:], poses[-1:]), logs[-1:], static=True), bad
 
 
 def _edge(samples: Samples) -> tuple[Edge | None, int]:
     """(edge with strictly ascending stamps, samples that are no transforms); of equal stamps the first counts."""
-    good: dict[int, tuple[Pose, int]] = {}
-    bad = 0
-    for transform, log_ns in samples:
-        stamp_ns = log_ns if transform.stamp_ns is None else transform.stamp_ns
-        try:
-            good.setdefault(stamp_ns, (from_quaternion(transform.translation, transform.quaternion), log_ns))
-        except ValueError:
-            bad += 1
-    if not good:
+    stamps, logs, poses, bad = _good(samples)
+    if not len(stamps):
         return None, bad
-    stamps = sorted(good)
-    poses = np.stack([good[stamp][0] for stamp in stamps])
-    logs = np.array([good[stamp][1] for stamp in stamps], np.int64)
-    return Edge(Trajectory(np.array(stamps, np.int64), poses), logs), bad
+    unique, first = np.unique(stamps, return_index=True)
+    return Edge(Trajectory(unique, poses[first]), logs[first]), bad
+
+
+def _good(samples: Samples) -> tuple[Int64, Int64, Float64, int]:
+    """(stamps, log times, (n, 4, 4) poses, how many were left out): finite ones with a quaternion of some length."""
+    stamps, logs, t, q = samples.arrays()
+    norm = np.linalg.norm(q, axis=1)
+    good = np.isfinite(t).all(axis=1) & np.isfinite(norm) & (norm >= MIN_QUATERNION)
+    poses = np.tile(np.eye(4), (int(good.sum()), 1, 1))
+    poses[:, :3, :3] = rotation(q[good] / norm[good, None])
+    poses[:, :3, 3] = t[good]
+    return stamps[good], logs[good], poses, int((~good).sum())

@@ -27,11 +27,11 @@ from stsem.log.container import (
 from stsem.log.damage import Damage
 from stsem.log.files import CACHE_BYTES, File, Store
 from stsem.log.fingerprint import Fingerprint
-from stsem.log.tracks import Track
+from stsem.log.tracks import MAX_NS, Track
 
 Progress = Callable[[int, int], None]
 CHUNKS_AHEAD = 3
-MAX_NS = 1 << 63
+PROGRESS_BYTES = 1 << 20
 SPOILT = (McapError, struct.error, ValueError, IndexError)
 """What mcap's parsers raise on bytes that are not such a record."""
 
@@ -72,15 +72,18 @@ def scan(files: Sequence[File], progress: Progress | None = None) -> Scan:
     Raises:
         LogError: a file is missing, empty, or not MCAP.
     """
-    result, total = Scan(files, Damage()), sum(file.size for file in files)
+    result, total, told = Scan(files, Damage()), sum(file.size for file in files), 0
     with Fingerprint() as fingerprint, ThreadPoolExecutor(1, "stsem-chunk") as worker:
         for file in files:
             one = _FileScan(result, file, worker)
             for record in read_records(file.path, result.damage, fingerprint):
                 one.take(record)
-                if progress:
-                    progress(fingerprint.bytes_fed, total)
+                if progress and fingerprint.bytes_fed >= told + PROGRESS_BYTES:
+                    told = fingerprint.bytes_fed
+                    progress(told, total)
             one.finish()
+        if progress:
+            progress(total, total)
         result.sha256 = fingerprint.hexdigest()
     return result
 

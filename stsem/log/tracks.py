@@ -2,7 +2,6 @@
 
 from array import array
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,9 +9,11 @@ from mcap.records import Schema
 
 from stsem.log.damage import Damage
 from stsem.log.decode import TABLE, MessageReader, Row, StampReader
-from stsem.log.messages import Calibration, ClassNames, Kind, Transform
+from stsem.log.messages import Calibration, ClassNames, Decoded, Kind, Transform
 
 Int64 = npt.NDArray[np.int64]
+Float64 = npt.NDArray[np.float64]
+MAX_NS = 1 << 63
 
 
 @dataclass(frozen=True)
@@ -37,39 +38,64 @@ class References:
         return len(self.stamp_ns)
 
 
+class Samples:
+    """Transforms of one pair of frames, in file order, packed: 72 bytes each."""
+
+    def __init__(self) -> None:
+        self._times = array("q")
+        self._values = array("d")
+
+    def __len__(self) -> int:
+        return len(self._times) // 2
+
+    def add(self, transform: Transform, log_ns: int) -> None:
+        """Take in one; without a stamp its log time counts."""
+        self._times.extend((log_ns if transform.stamp_ns is None else transform.stamp_ns, log_ns))
+        self._values.extend((*transform.translation, *transform.quaternion))
+
+    def arrays(self) -> tuple[Int64, Int64, Float64, Float64]:
+        """(stamps (n,), log times (n,), translations (n, 3), quaternions (n, 4) x y z w)."""
+        times = _as_int64(self._times).reshape(-1, 2)
+        values = np.array(self._values, np.float64).reshape(-1, 7)
+        return times[:, 0], times[:, 1], values[:, :3], values[:, 3:]
+
+
 class Track:
     """One channel during and after the scan.
 
-    Args:
+    Attributes:
         topic, schema, encoding: of the channel; `encoding` is that of its messages.
         row: of the decoder table; None when stsem does not read such messages, which are then only counted.
+        trouble: why a row could not be used; "" otherwise.
+        count, first_log_ns, last_log_ns, largest_gap_ns: of all messages.
+        unstamped: messages without a capture stamp.
+        transforms: (parent, child) -> samples.
+        calibrations, class_names: those that differ from the one before.
     """
 
     def __init__(self, topic: str, schema: Schema, encoding: str, damage: Damage) -> None:
         self.topic, self.schema, self.encoding = topic, schema.name, encoding
         self.row: Row | None = TABLE.get((encoding, schema.name))
         self.trouble = ""
-        self.count = self.unstamped = 0
+        self.count = self.unstamped = self.largest_gap_ns = 0
         self.first_log_ns: int | None = None
         self.last_log_ns: int | None = None
-        self.largest_gap_ns = 0
-        self.transforms: list[tuple[Transform, int]] = []
+        self.transforms: dict[tuple[str, str], Samples] = {}
         self.calibrations: list[Calibration] = []
         self.class_names: list[ClassNames] = []
-        self._damage = damage
-        self._last_tail = b""
-        self._previous_log_ns: int | None = None
-        self._columns = [array("q") for _ in range(5)]
         self.decode: MessageReader | None = None
         self._stamp: StampReader | None = None
-        self._make_readers(schema)
+        self._damage = damage
+        self._behind_stamp = b""
+        self._previous_log_ns: int | None = None
+        self._columns = [array("q") for _ in range(5)]
+        if self.row is not None:
+            self._make_readers(self.row, schema)
 
-    def _make_readers(self, schema: Schema) -> None:
-        if self.row is None:
-            return
+    def _make_readers(self, row: Row, schema: Schema) -> None:
         try:
-            self.decode = self.row.reader(schema)
-            self._stamp = self.row.stamp(schema) if self.row.stamp else None
+            self.decode = row.reader(schema)
+            self._stamp = row.stamp(schema) if row.stamp else None
         except Exception as err:  # noqa: BLE001  a schema is foreign input to three parsers with errors of their own
             self.trouble = f"the schema of {self.topic} cannot be read ({err or type(err).__name__})"
             self.row = None
@@ -80,17 +106,15 @@ class Track:
         return self.row.kind if self.row else None
 
     def add(self, payload: memoryview, log_ns: int, place: int, offset: int) -> None:
-        """Take in one message, in file order."""
+        """Take in one message, in file order. An image whose stamp cannot be read stays, at its log time."""
         self._count(log_ns)
-        if self.row is None:
+        if self.row is None or self.decode is None:
             return
+        stamp_ns = None
         try:
-            stamp_ns = self._stamp(payload) if self._stamp else self._read(payload, log_ns)
-            if self._stamp and self.row.kind is Kind.CALIBRATION:
-                self._read_if_new(payload, log_ns)
+            stamp_ns = self._take(self.row, self.decode, payload, log_ns)
         except Exception:  # noqa: BLE001  any error of a foreign parser means: undecodable
             self._damage.undecodable(self.topic, place, offset)
-            stamp_ns = None
             if self.row.kind not in (Kind.IMAGE, Kind.COMPRESSED):
                 return
         if stamp_ns is None:
@@ -107,24 +131,26 @@ class Track:
         self.first_log_ns = log_ns if self.first_log_ns is None else min(self.first_log_ns, log_ns)
         self.last_log_ns = log_ns if self.last_log_ns is None else max(self.last_log_ns, log_ns)
 
-    def _read_if_new(self, payload: memoryview, log_ns: int) -> None:
-        assert self.row is not None
-        tail = bytes(payload[self.row.unstamped_tail or 0 :])
-        if tail != self._last_tail:
-            self._read(payload, log_ns)
-            self._last_tail = tail
+    def _take(self, row: Row, decode: MessageReader, payload: memoryview, log_ns: int) -> int | None:
+        """Stamp of a message; small ones are read wholly, calibrations only when they differ from the one before."""
+        if self._stamp is None:
+            return self._read(decode(payload), log_ns)
+        if row.kind is Kind.CALIBRATION and (behind := bytes(payload[row.stamp_bytes :])) != self._behind_stamp:
+            self._read(decode(payload), log_ns)
+            self._behind_stamp = behind
+        return plausible(self._stamp(payload))
 
-    def _read(self, payload: memoryview, log_ns: int) -> int | None:
-        assert self.decode is not None
-        message = self.decode(payload)
+    def _read(self, message: Decoded, log_ns: int) -> int | None:
         if isinstance(message, tuple):
-            self.transforms.extend((transform, log_ns) for transform in message)
-            return message[0].stamp_ns if message else None
+            stamps = [plausible(transform.stamp_ns) for transform in message]
+            for transform in message:
+                self.transforms.setdefault((transform.parent, transform.child), Samples()).add(transform, log_ns)
+            return stamps[0] if stamps else None
         if isinstance(message, Calibration) and [message.camera] != [c.camera for c in self.calibrations[-1:]]:
             self.calibrations.append(message)
         if isinstance(message, ClassNames) and [message.names] != [c.names for c in self.class_names[-1:]]:
             self.class_names.append(message)
-        return message.stamp_ns
+        return plausible(message.stamp_ns)
 
     def references(self) -> References:
         """All stamped messages, in order."""
@@ -137,5 +163,12 @@ class Track:
         return _as_int64(self._columns[1]) - _as_int64(self._columns[0])
 
 
-def _as_int64(column: "array[Any]") -> Int64:
-    return np.frombuffer(column, np.int64) if len(column) else np.zeros(0, np.int64)
+def plausible(stamp_ns: int | None) -> int | None:
+    """`stamp_ns` if it can be a time; ValueError otherwise."""
+    if stamp_ns is not None and not 0 < stamp_ns < MAX_NS:
+        raise ValueError(f"{stamp_ns} ns is no time")
+    return stamp_ns
+
+
+def _as_int64(column: "array[int]") -> Int64:
+    return np.array(column, np.int64)

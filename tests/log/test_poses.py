@@ -8,7 +8,7 @@ from mcap.records import Schema
 from stsem.log.damage import Damage
 from stsem.log.messages import Transform
 from stsem.log.poses import MAX_GAP_NS, stamped_poses, transform_chain
-from stsem.log.tracks import Track
+from stsem.log.tracks import Samples, Track
 from stsem.pose import Pose, from_quaternion, interpolate
 
 MS = 1_000_000
@@ -24,7 +24,8 @@ def turn(degrees: float) -> Q:
 def track(topic: str, *samples: tuple[int | None, int, str, str, tuple[float, float, float], Q]) -> Track:
     name = "tf2_msgs/msg/TFMessage"
     made = Track(topic, Schema(id=1, name=name, encoding="ros2msg", data=ROS.schema(name)), "cdr", Damage())
-    made.transforms = [(Transform(stamp, parent, child, t, q), log) for stamp, log, parent, child, t, q in samples]
+    for stamp, log, parent, child, t, q in samples:
+        made.transforms.setdefault((parent, child), Samples()).add(Transform(stamp, parent, child, t, q), log)
     made.count = len(samples)
     return made
 
