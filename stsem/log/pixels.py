@@ -4,6 +4,7 @@ All functions raise ValueError with a sentence's middle ("encoding yuv9 is not s
 topic and the stamp.
 """
 
+import zlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -173,6 +174,8 @@ def _decode_file(message: CompressedImage, flags: int) -> Image:
         raise ValueError(f"the format {message.format!r} is not supported, only jpeg, png and webp")
     if form == JPEG and b"\xff\xd9" not in bytes(message.data[-4096:]):
         raise ValueError("the jpeg ends early")
+    if form == PNG:
+        _check_png(message.data)
     try:
         decoded = cv2.imdecode(np.frombuffer(message.data, np.uint8), flags)
     except cv2.error as err:
@@ -180,6 +183,25 @@ def _decode_file(message: CompressedImage, flags: int) -> Image:
     if decoded is None:
         raise ValueError(f"the {form} cannot be decoded")
     return decoded  # type: ignore[return-value]
+
+
+def _check_png(data: memoryview) -> None:
+    """A png has a checksum per chunk and says its size first: the decoder only mutters about either."""
+    at, kind = 8, b""
+    while kind != b"IEND":
+        if at + 12 > len(data):
+            raise ValueError("the png ends early")
+        length, kind = int.from_bytes(data[at : at + 4], "big"), bytes(data[at + 4 : at + 8])
+        end = at + 8 + length
+        if end + 4 > len(data):
+            raise ValueError("the png ends early")
+        if zlib.crc32(data[at + 4 : end]) != int.from_bytes(data[end : end + 4], "big"):
+            raise ValueError("the png does not have its checksum")
+        if at == 8:
+            width, height = (int.from_bytes(data[k : k + 4], "big") for k in (16, 20))
+            if kind != b"IHDR" or not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE):
+                raise ValueError(f"a png of {width}x{height} cannot be")
+        at = end + 4
 
 
 def _uint8(pixels: Any) -> Image:

@@ -1,5 +1,7 @@
 """Pixels: every encoding of the table, padding, byte order, file formats, and clear refusals."""
 
+import zlib
+
 import cv2
 import numpy as np
 import pytest
@@ -18,6 +20,12 @@ def raw(array: np.ndarray, encoding: str, *, padding: int = 0, big_endian: bool 
 
 def compressed(data: bytes, form: str = "") -> CompressedImage:
     return CompressedImage(1, "cam", form, memoryview(data))
+
+
+def giant_png() -> bytes:
+    """A small file whose head asks for a terabyte."""
+    head = b"IHDR" + (10**6).to_bytes(4, "big") * 2 + b"\x08\2\0\0\0"
+    return b"\x89PNG\r\n\x1a\n" + b"\0\0\0\x0d" + head + zlib.crc32(head).to_bytes(4, "big") + bytes(100)
 
 
 @pytest.mark.parametrize("padding", [0, 1, 7])
@@ -112,7 +120,10 @@ def test_labels() -> None:
         (pixels.colour, compressed(b"nonsense", "tiff"), "the format 'tiff' is not supported, only jpeg, png and webp"),
         (pixels.colour, compressed(b"", ""), "the format '' is not supported"),
         (pixels.colour, compressed(bytes(cv2.imencode(".jpg", picture(0))[1])[:200]), "the jpeg ends early"),
-        (pixels.colour, compressed(png(picture(0))[:40]), "the png cannot be decoded"),
+        (pixels.colour, compressed(png(picture(0))[:40]), "the png ends early"),
+        (pixels.colour, compressed(png(picture(0))[:-5]), "the png ends early"),
+        (pixels.colour, compressed(png(picture(0))[:60] + b"?" + png(picture(0))[61:]), "does not have its checksum"),
+        (pixels.colour, compressed(giant_png()), "a png of 1000000x1000000 cannot be"),
         (pixels.colour, RawImage(1, "", 4, 4, "rgb8", False, 11, memoryview(bytes(48))), "in rows of 11 bytes"),
         (pixels.colour, RawImage(1, "", 4, 4, "rgb8", False, 12, memoryview(bytes(47))), "came in 47 bytes"),
         (pixels.colour, RawImage(1, "", 0, 4, "rgb8", False, 12, memoryview(b"")), "a size of 0x4 cannot be"),
