@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from stsem.document.schema import Comparison, ComparisonRow, Run
 from stsem.metrics.accumulate import Samples
-from stsem.metrics.blocks import NoInterval
+from stsem.metrics.blocks import Blocks, NoInterval
 from stsem.metrics.bootstrap import Metric, paired_difference, shared_blocks
 from stsem.metrics.scores import scores_of_tally
 from stsem.replay.record import Record
@@ -60,23 +60,27 @@ def compare(contenders: list[Contender], seed: int) -> tuple[Comparison, ...]:
         seed: of the resampling.
     """
     base, *others = contenders
+    scores = _scores(contenders, seed) if others else []
     return tuple(
-        Comparison(
-            base=base.part.mode, other=other.part.mode, rows=(*_scores(base, other, seed), *_timings(base, other))
-        )
-        for other in others
+        Comparison(base=base.part.mode, other=other.part.mode, rows=(*scores[i], *_timings(base, other)))
+        for i, other in enumerate(others)
     )
 
 
-def _scores(base: Contender, other: Contender, seed: int) -> list[ComparisonRow]:
+def _scores(contenders: list[Contender], seed: int) -> list[list[ComparisonRow]]:
+    """For each contender but the first: a row per pass and metric, over blocks of log time that all of them share."""
     passes: dict[str, Callable[[Contender], Samples | None]] = {
         "offline": lambda c: _own(c.offline), "delivered_paired": lambda c: _own(c.real_time), "streaming": _streaming,
     }  # fmt: skip
-    rows = []
+    rows: list[list[ComparisonRow]] = [[] for _ in contenders[1:]]
     for name, samples_of in passes.items():
-        first, second = samples_of(base), samples_of(other)
-        if first is not None and second is not None and len(first) and len(second):
-            rows += [_score_row(f"{name}.{metric}", metric, first, second, seed) for metric in SCORE_METRICS]
+        samples = [found for c in contenders if (found := samples_of(c)) is not None and len(found)]
+        if len(samples) < len(contenders):
+            continue
+        for metric in SCORE_METRICS:
+            blocks = shared_blocks(samples, metric)
+            for row, other in zip(rows, samples[1:], strict=True):
+                row.append(_score_row(f"{name}.{metric}", metric, samples[0], other, seed, blocks))
     return rows
 
 
@@ -89,8 +93,10 @@ def _streaming(contender: Contender) -> Samples | None:
     return None if record is None or record.scorecard is None else record.scorecard.streaming_samples()
 
 
-def _score_row(path: str, metric: Metric, first: Samples, second: Samples, seed: int) -> ComparisonRow:
-    found = paired_difference(first, second, metric, seed=seed, blocks=shared_blocks([first, second], metric))
+def _score_row(
+    path: str, metric: Metric, first: Samples, second: Samples, seed: int, blocks: Blocks | NoInterval
+) -> ComparisonRow:
+    found = paired_difference(first, second, metric, seed=seed, blocks=blocks)
     values = [getattr(scores_of_tally(samples.tallies.sum(axis=0)), metric) for samples in (first, second)]
     return ComparisonRow(
         metric=path,

@@ -9,7 +9,7 @@ from stsem.log.log import Loaded
 from stsem.metrics.scorecard import Scorecard
 from stsem.replay.realtime import NewestAnswer
 from stsem.replay.schedule import Slot
-from stsem.result import FrameResult
+from stsem.result import FrameResult, Outcome
 
 
 class Record:
@@ -36,8 +36,12 @@ class Record:
         self.scorecard.judge_streaming(slot.index, loaded.truth, labels, age_ns=age)
 
     def ended(self, result: FrameResult, loaded: Loaded) -> None:
-        """Judge the answer against its own frame, and keep the result without its labels."""
-        if self.scorecard is not None and loaded.truth is not None:
+        """Judge the answer against its own frame, and keep the result without its labels.
+
+        Without a clock, a frame that cannot be decoded or completed was never asked about, and is not judged.
+        """
+        never_came = result.arrival_ns is None and result.outcome in (Outcome.UNDECODABLE, Outcome.INCOMPLETE)
+        if self.scorecard is not None and loaded.truth is not None and not never_came:
             self._judge(self.scorecard, result, loaded.truth)
         if result.index in self._watched and result.labels is not None:
             self.answers[result.index] = result.labels

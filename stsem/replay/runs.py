@@ -195,6 +195,8 @@ def _why_not(context: Context, found: Found) -> dict[str, str]:
             why[name] = context.model.reason or absent
         elif not accuracies.measured:
             why[name] = accuracies.reason
+        elif name != "streaming" and accuracies.own is None:
+            why[name] = "no frame with truth was answered"
     if config.clock == "offline":
         why["latency_ms"] = why["throughput"] = NO_CLOCK
     elif not config.sustainable:
