@@ -55,11 +55,11 @@ class Loss(Part):
     prediction: Number = None
     """Offline mIoU of `per-frame` minus that of this mode: what predicting instead of segmenting costs. Fraction."""
     scheduling: Number = None
-    """Offline mIoU minus delivered mIoU of this mode: what dropped and late-chosen frames cost. Fraction."""
+    """Offline mIoU of this mode minus delivered: what other keyframes, and longer distances to them, cost. Fraction."""
     staleness: Number = None
-    """Delivered mIoU minus streaming mIoU: what the world's moving on during the computation costs. Fraction."""
+    """Delivered mIoU minus streaming mIoU: what the world's moving on until an answer is there costs. Fraction."""
     n: LossParts = Field(default_factory=LossParts)
-    """Number of scored frames behind each part."""
+    """Scored frames behind the scarcer of the two scores of each part."""
     why: dict[str, str] = Field(default_factory=dict)
     """For each part that is null: why it was not measured."""
 
@@ -111,6 +111,8 @@ class Consistency(Part):
     """Temporal consistency of the answers."""
 
     score: Share = None
-    """Agreement of an answer with the previous one carried into this frame. Fraction."""
+    """mIoU between each answer and the previous one carried into its frame, one matrix over all pairs. Fraction."""
+    correspondence: str = ""
+    """How the previous answer is carried into the frame: `identity` or `homography`."""
     pairs: Count = 0
     """Pairs of consecutive answers compared."""

@@ -82,9 +82,9 @@ class Run(Part):
     offline: Score | None = None
     """Every frame answered by the mode's rule, no clock."""
     delivered: Score | None = None
-    """The answers of the real-time run, each judged against its own frame."""
+    """The answers of the real-time run, however late, against their own frames; dropped frames are not in it."""
     streaming: Score | None = None
-    """At each frame's arrival, the newest finished answer judged against this frame's truth."""
+    """At every arrival, the finished answer with the newest stamp, against the truth of the frame that just arrived."""
     loss: Loss | None = None
     """Where mIoU is lost on the way from 1 to the streaming score."""
     strata: dict[str, Score] = Field(default_factory=dict)

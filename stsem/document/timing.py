@@ -55,7 +55,7 @@ class Latency(Part):
     from_stamp: Distribution = Field(default_factory=Distribution)
     """Answered minus captured: from sensor to result. ms."""
     waiting: Distribution = Field(default_factory=Distribution)
-    """Share of `from_arrival` during which no job of the frame's answer ran. ms."""
+    """The part of the latency from arrival during which no job of the frame's answer held a core. ms."""
     stages: dict[str, StageLatency] = Field(default_factory=dict)
     """Waiting and service of each stage, on and beside the answer path."""
 
@@ -72,15 +72,15 @@ class Throughput(Part):
     processed_share: Share = None
     """Answered frames over all frames of the log or window. Fraction."""
     utilisation: tuple[Share, ...] = ()
-    """Busy share of each core, core 0 first, from time zero to the last answer. Fraction."""
+    """Busy share of each core, core 0 first, from the first arrival to the last event. Fraction."""
     deadline_ms: Number = None
     """The deadline for an answer, from arrival, in ms (default: capture period / rate)."""
     deadline_misses: Count | None = None
     """Frames answered after the deadline or not at all; null without a clock."""
     jitter_ms: Number = None
-    """Standard deviation of the intervals between consecutive answers, ms."""
+    """Standard deviation (of the population) of the intervals between consecutive answers, ms."""
     real_time_factor: Number = None
-    """Length of the log over the simulated time from the first arrival to the last answer; 1 keeps up."""
+    """Seconds of log between the first and last answered frame's stamps per simulated second between their answers."""
     sustainable_hz: Number = None
     """Highest offered rate with at most 1 % dropped and p95 under the fixed deadline; null unless searched for."""
 
@@ -95,7 +95,7 @@ class Outcomes(Part):
     no_source: Count = 0
     """Arrived in time, but nothing was finished yet to predict from; scored as all "no label"."""
     dropped_busy: Count = 0
-    """Replaced in the mailbox by a newer frame while the pipeline was busy."""
+    """Replaced in the mailbox, or refused by a full queue, while the pipeline was busy."""
     undecodable: Count = 0
     """The message could not be decoded."""
     incomplete: Count = 0

@@ -1,5 +1,6 @@
 """The metrics that tables and comparisons show: where each stands in a run, its name, unit and direction."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stsem.document.accuracy import Score
@@ -111,12 +112,21 @@ def row_delta(row: ComparisonRow) -> str:
 
 
 def row_reading(row: ComparisonRow, base: str, other: str) -> str:
-    """What an interval says: who is better, or that it cannot be told."""
+    """What the interval says: who is better, or that it cannot be told; without one, that there is none."""
     if row.delta is None:
-        return row.why_no_interval or NOT_MEASURED
+        return NOT_MEASURED
     if row.ci95 is None:
-        return f"no interval: {row.why_no_interval}" if row.why_no_interval else "no interval"
+        return "no interval"
     low, high = row.ci95
     if low <= 0 <= high:
         return "no clear difference"
     return f"{other} better" if (low > 0) == row.higher_is_better else f"{base} better"
+
+
+def no_intervals(rows: Sequence[ComparisonRow]) -> tuple[str, ...]:
+    """Why there is no interval: one sentence per reason, with the metrics that it holds for."""
+    reasons: dict[str, list[str]] = {}
+    for row in rows:
+        if row.ci95 is None and row.why_no_interval:
+            reasons.setdefault(row.why_no_interval, []).append(row_name(row).rpartition(",")[0] or row_name(row))
+    return tuple(f"No interval for {', '.join(names)}: {reason}." for reason, names in reasons.items())

@@ -292,7 +292,7 @@ def _comparison(runs: tuple[Run, ...], truth: bool, clock: bool) -> Comparison:
                 delta = getattr(b, key) - getattr(a, key)
                 rows.append(
                     ComparisonRow(
-                        metric=f"{name}.{key}",
+                        metric=f"{name.replace('delivered', 'delivered_paired')}.{key}",
                         base=getattr(a, key),
                         other=getattr(b, key),
                         delta=delta,

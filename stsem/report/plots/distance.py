@@ -11,6 +11,9 @@ from stsem.report.plots.style import MUTED, SURFACE, mode_colour, new_figure, ti
 ENOUGH = 10
 """Frames that a distance needs to be a filled point (DESIGN 4)."""
 
+_TOP = 106
+"""Room for the figures above 100 %."""
+
 
 def draw(inputs: ReportInputs) -> Figure | None:
     """A line per mode that predicts; per-frame as the level it starts from; None where nothing was predicted."""
@@ -31,6 +34,7 @@ def draw(inputs: ReportInputs) -> Figure | None:
     axes.set_ylabel("mIoU, %")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.margins(y=0.22)
+    axes.set_ylim(top=min(axes.get_ylim()[1], _TOP))
     below = f"Offline. Small figures: number of frames; hollow: fewer than {ENOUGH}, not in the mean or minimum."
     title(axes, "mIoU over the distance to the keyframe", below)
     axes.legend(loc="best")

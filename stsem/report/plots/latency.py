@@ -4,7 +4,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stsem.report.inputs import ReportInputs
-from stsem.report.plots.style import INK, MUTED, mode_colour, new_figure, title
+from stsem.report.plots.style import INK, MUTED, SURFACE, apart, mode_colour, new_figure, title
+from stsem.report.wording import number
+
+_GROUND = {"facecolor": SURFACE, "edgecolor": "none", "pad": 1.0}
 
 
 def draw(inputs: ReportInputs) -> Figure | None:
@@ -16,11 +19,13 @@ def draw(inputs: ReportInputs) -> Figure | None:
     figure = new_figure(3.4)
     axes = figure.add_subplot()
     longest = max(times[-1] for times in samples.values() if times) / 1e6
-    heights: list[float] = []
-    for i, run in enumerate(inputs.document.runs):
-        if times := samples[run.mode]:
-            _steps(axes, times, run.frames, longest, mode_colour(run.mode, i))
-            _end(axes, run.mode, 100 * len(times) / run.frames, longest, mode_colour(run.mode, i), heights)
+    answered = [(i, run, samples[run.mode]) for i, run in enumerate(inputs.document.runs) if samples[run.mode]]
+    shares = [100 * len(times) / run.frames for _, run, times in answered]
+    for (i, run, times), share, height in zip(answered, shares, apart(shares, 7), strict=True):
+        colour = mode_colour(run.mode, i)
+        _steps(axes, times, run.frames, longest, colour)
+        axes.annotate(f"{run.mode}: {share:.1f} %", (longest * 1.02, height), (5, 0), textcoords="offset points",
+                      va="center", color=colour, fontweight="bold")  # fmt: skip
     _deadline(axes, inputs, longest)
     axes.set_xlim(0, longest * 1.32)
     axes.set_ylim(0, 104)
@@ -38,21 +43,12 @@ def _steps(axes: Axes, times_ns: list[int], frames: int, longest_ms: float, colo
     middle = (len(ms) + 1) // 2 - 1
     axes.plot(ms[middle], share[middle], marker="o", color=colour, markersize=6)
     axes.annotate(f"median {ms[middle]:.0f} ms", (ms[middle], share[middle]), (7, -4), textcoords="offset points",
-                  va="top", fontsize=8, color=colour)  # fmt: skip
-
-
-def _end(axes: Axes, mode: str, share: float, longest_ms: float, colour: str, heights: list[float]) -> None:
-    height = share
-    while any(abs(height - other) < 7 for other in heights):
-        height -= 7
-    heights.append(height)
-    axes.annotate(f"{mode}: {share:.1f} %", (longest_ms * 1.02, height), (5, 0), textcoords="offset points",
-                  va="center", color=colour, fontweight="bold")  # fmt: skip
+                  va="top", fontsize=8, color=colour, bbox=_GROUND)  # fmt: skip
 
 
 def _deadline(axes: Axes, inputs: ReportInputs, longest_ms: float) -> None:
     deadlines = {run.throughput.deadline_ms for run in inputs.document.runs if run.throughput}
     for deadline in sorted(d for d in deadlines if d is not None and d <= 1.3 * longest_ms):
         axes.axvline(deadline, color=INK, linewidth=1.0, linestyle=(0, (4, 3)))
-        axes.annotate(f"deadline {deadline:g} ms", (deadline, 2), (4, 2), textcoords="offset points", fontsize=8,
+        axes.annotate(f"deadline {number(deadline)} ms", (deadline, 2), (4, 2), textcoords="offset points", fontsize=8,
                       color=MUTED)  # fmt: skip

@@ -12,6 +12,7 @@ from stsem.classes import NO_LABEL, Labels
 from stsem.frame import Image
 from stsem.report.inputs import ReportInputs, StripFrame
 from stsem.report.plots.style import INK, MUTED, mode_colour, new_figure
+from stsem.report.wording import plural
 
 RIGHT, BOTH = (222, 226, 230), (45, 45, 52)
 _COLUMN_IN = 2.1
@@ -26,20 +27,23 @@ def draw(inputs: ReportInputs) -> Figure | None:
     with_truth = any(frame.truth is not None for frame in inputs.strip)
     titles = ["image", *["truth"] * with_truth, *modes, *["errors"] * (with_truth and bool(modes))]
     aspect = inputs.strip[0].image.shape[0] / inputs.strip[0].image.shape[1]
-    figure = new_figure(len(inputs.strip) * (_COLUMN_IN * aspect + 0.22) + 0.95)
-    figure.set_figwidth(_COLUMN_IN * len(titles) + 0.1)
+    predicting = {run.mode for run in inputs.document.runs if run.outcomes.propagated or len(run.by_distance) > 1}
+    figure = new_figure(1.0)
     palette = classes.palette()
     seen: set[int] = set()
     for i, frame in enumerate(inputs.strip):
         pictures = _pictures(frame, modes, palette, seen, with_truth)
         for j, (name, picture) in enumerate(zip(titles, pictures, strict=True)):
             axes = figure.add_subplot(len(inputs.strip), len(titles), i * len(titles) + j + 1)
-            _cell(axes, picture, f"{name}" if i == 0 else "", _caption(frame, name, j))
+            _cell(axes, picture, f"{name}" if i == 0 else "", _caption(frame, name, j, predicting))
     handles = [Patch(color=_hex(palette[k]), label=classes.names[k]) for k in sorted(seen) if k < len(classes)]
     handles += [Patch(color="#000000", label="ignored, or no label")] * (NO_LABEL in seen)
-    figure.legend(handles=handles, loc="outside lower left", ncols=7, title="Classes", alignment="left")
+    columns = len(titles) if with_truth else len(titles) + 2
+    figure.legend(handles=handles, loc="outside lower left", ncols=columns, title="Classes", alignment="left")
     if with_truth:
         figure.legend(handles=_error_legend(modes), loc="lower right", ncols=2, title="Errors", alignment="left")
+    legend_in = 0.36 + 0.165 * max(2, -(-len(handles) // columns))
+    figure.set_size_inches(_COLUMN_IN * len(titles), len(inputs.strip) * (_COLUMN_IN * aspect + 0.2) + 0.25 + legend_in)
     return figure
 
 
@@ -108,18 +112,17 @@ def _cell(axes: Axes, picture: Image | None, heading: str, caption: str) -> None
     axes.set_xlabel(caption, fontsize=8, color=MUTED, loc="left", labelpad=2)
 
 
-def _caption(frame: StripFrame, name: str, column: int) -> str:
+def _caption(frame: StripFrame, name: str, column: int, predicting: set[str]) -> str:
     if column == 0:
         return f"frame {frame.index}"
-    if name == "errors" and frame.truth is not None:
+    distance = frame.distance.get(name) if name in predicting else None
+    if distance is None:
         return ""
-    distance = frame.distance.get(name)
-    if name not in frame.answers or distance is None:
-        return ""
-    return "is a keyframe" if distance == 0 else f"{distance} frame{'s' * (distance != 1)} after its keyframe"
+    return "is a keyframe" if distance == 0 else f"{plural(distance, 'frame')} after its keyframe"
 
 
 def _error_legend(modes: list[str]) -> list[Patch]:
-    handles = [Patch(color=mode_colour(mode, i), label=f"only {mode} wrong") for i, mode in enumerate(modes)]
+    only = "only {} wrong" if len(modes) > 1 else "{} wrong"
+    handles = [Patch(color=mode_colour(mode, i), label=only.format(mode)) for i, mode in enumerate(modes)]
     several = [Patch(color=_hex(BOTH), label="both wrong" if len(modes) == 2 else "several wrong")]
     return [*handles, *(several if len(modes) > 1 else []), Patch(color=_hex(RIGHT), label="right")]

@@ -2,7 +2,7 @@
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -88,6 +88,16 @@ def legend_beside_title(axes: Axes, entries: int) -> None:
     above = mtransforms.ScaledTranslation(0, _TITLE_PT / 72, axes.figure.dpi_scale_trans)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), bbox_transform=axes.transAxes + above, ncols=entries,
                 borderpad=0.0, borderaxespad=0.0, handlelength=1.4, columnspacing=1.4)  # fmt: skip
+
+
+def apart(heights: Sequence[float], gap: float) -> list[float]:
+    """`heights` moved down where needed, so that no two are closer than `gap`; the highest stays."""
+    moved = list(heights)
+    ceiling = float("inf")
+    for i in sorted(range(len(moved)), key=lambda i: -moved[i]):
+        moved[i] = min(moved[i], ceiling)
+        ceiling = moved[i] - gap
+    return moved
 
 
 def png(figure: Figure) -> bytes:

@@ -2,7 +2,7 @@
 
 from stsem.document.accuracy import Consistency, DistanceSummary, Loss, Score
 from stsem.document.schema import Comparison, Document, Run
-from stsem.report.metrics import METRICS, row_delta, row_name, row_reading, row_value, shown
+from stsem.report.metrics import METRICS, no_intervals, row_delta, row_name, row_reading, row_value, shown
 from stsem.report.outline import Block, Column, Figure, Folded, Row, Section, Table, Text
 from stsem.report.plots.classes import best_pass, present_classes
 from stsem.report.plots.distance import ENOUGH
@@ -40,8 +40,10 @@ def _comparison(comparison: Comparison) -> Table:
         for row in comparison.rows
     )  # fmt: skip
     notes = (
-        "Differences are paired: the same frames in both modes; a frame that one mode dropped stays in, as all wrong. "
+        "Differences are paired: the same frames in both modes; a frame that one mode dropped stays in, as all wrong "
+        "(so the delivered scores are lower here than in the other tables, which hold the answers alone). "
         "Intervals: block bootstrap over stretches of the log; `no clear difference` where the interval holds 0.",
+        *no_intervals(comparison.rows),
         *(score_meanings() if any(row.unit == "fraction" for row in comparison.rows) else ()),
     )
     return Table(columns, rows, notes)
@@ -183,7 +185,7 @@ def _strata(document: Document) -> Table | None:
 def _consistency(document: Document) -> list[Block]:
     return [
         Text(f"`{run.mode}`: temporal consistency {percent(found.score)} % over {plural(found.pairs, 'pair')} of "
-             f"answers. {meaning(Consistency, 'score')}")
+             f"answers, carried by {found.correspondence}. {meaning(Consistency, 'score')}")
         for run in document.runs
         if (found := run.consistency) and found.score is not None
     ]  # fmt: skip

@@ -6,6 +6,7 @@ from stsem.report.metrics import METRICS, row_delta, row_reading, shown
 from stsem.report.outline import Tile
 from stsem.report.wording import NONE, NOT_MEASURED, TOO_FEW, meaning, number, percent, plural
 
+_DISTURBED = ("disturbed", "other work held a core")
 _TILES = {
     "streaming.miou": ("Streaming mIoU", " %"),
     "offline.miou": ("Offline mIoU", " %"),
@@ -39,7 +40,7 @@ def basis(document: Document) -> str:
     else:
         said.append(_coverage(document))
     if any(run.latency_ms for run in document.runs):
-        costs = document.identity.costs or "the durations of this host"
+        costs = f"the cost profile `{document.identity.costs}`" if document.identity.costs else "this host as it ran"
         said.append(f"Latencies and rates are on the simulated clock, with job durations from {costs}.")
     else:
         said.append("There was no clock (offline), so there are no latencies.")
@@ -48,7 +49,9 @@ def basis(document: Document) -> str:
 
 def warnings(document: Document) -> tuple[str, ...]:
     """What must be known before a number is believed: the document's own warnings, and what its identity implies."""
-    disturbed = document.identity.costs_disturbed and not any("disturbed" in text for text in document.warnings)
+    disturbed = document.identity.costs_disturbed and not any(
+        word in text for text in document.warnings for word in _DISTURBED
+    )
     implied = (
         f"The cost profile {document.identity.costs} is disturbed: it was measured while other work held a core.",
     )
@@ -77,12 +80,13 @@ def _tile(path: str, base: Run, other: Run, row: ComparisonRow | None) -> Tile:
     worded = f"{base.mode}: {against}{unit if against[0].isdigit() else ''}"
     if row is None or row.delta is None:
         return Tile(name, value, other.mode, worded, meaning=means)
-    points = " points" if row.unit == "fraction" else unit
+    points = (" points" if row.ci95 else " points, no interval") if row.unit == "fraction" else unit
     return Tile(name, value, other.mode, worded, row_delta(row) + points, _good(row), means)
 
 
 def _good(row: ComparisonRow) -> bool | None:
-    if not row.delta or (row.ci95 is not None and row.ci95[0] <= 0 <= row.ci95[1]):
+    unclear = row.unit == "fraction" if row.ci95 is None else row.ci95[0] <= 0 <= row.ci95[1]
+    if not row.delta or unclear:
         return None
     return (row.delta > 0) == row.higher_is_better
 
