@@ -5,13 +5,36 @@ from pathlib import Path
 
 import pytest
 
+from stsem.sim.profile import CostProfile
+
+from .made_up_walk import write_walk
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(scope="session")
 def shared_logs() -> Path:
-    """Folder of recorded logs that cannot be redistributed: STSEM_SHARED_LOGS, else ../shared/logs beside the checkout."""
+    """Folder of recorded logs that cannot be redistributed: STSEM_SHARED_LOGS, else ../shared/logs."""
     folder = Path(os.environ.get("STSEM_SHARED_LOGS", ROOT.parent / "shared" / "logs"))
     if not folder.is_dir():
         pytest.skip(f"the recorded logs are not at hand: no folder {folder} (set STSEM_SHARED_LOGS)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def tiny_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A foxglove log of 12 frames, 96x64, with colour, depth, poses, labels, calibration and class table."""
+    return write_walk(tmp_path_factory.mktemp("logs") / "tiny.mcap")
+
+
+@pytest.fixture(scope="session")
+def made_up_costs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cost profile in round numbers: the network takes about the period of `tiny_log`, the rest is quick."""
+    samples = {
+        "segment@2": (90, 100, 110, 120), "segment@1": (160, 180), "register@1": (8, 9), "propagate@1": (1, 2),
+        "fuse@1": (20,), "decode@1": (3,),
+    }  # fmt: skip
+    profile = CostProfile("made up", {name: tuple(ms * 1_000_000 for ms in kept) for name, kept in samples.items()})
+    path = tmp_path_factory.mktemp("costs") / "made-up.json"
+    profile.save(path)
+    return path

@@ -1,0 +1,68 @@
+"""The commands, called in this process and in a folder of their own."""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from stsem.cli import main
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What a command left: exit code, stdout, stderr."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def sentence(self) -> str:
+        """The one line on stderr without the command's name; fails unless it is exactly one."""
+        lines = self.err.strip().splitlines()
+        assert len(lines) == 1, self.err
+        assert lines[0].startswith("stsem: "), lines[0]
+        assert "defect of stsem" not in lines[0], lines[0]
+        return lines[0].removeprefix("stsem: ")
+
+
+Cli = Callable[..., Ran]
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty current folder with an empty cache beside it."""
+    folder = tmp_path / "home"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("STSEM_CACHE", str(tmp_path / "cache"))
+    return folder
+
+
+@pytest.fixture
+def cli(home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Cli:
+    """Runs `stsem ARGUMENTS`."""
+
+    def run(*arguments: object) -> Ran:
+        monkeypatch.setattr(sys, "argv", ["stsem", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main.stsem()
+        caught = capsys.readouterr()
+        code = end.value.code
+        return Ran(code if isinstance(code, int) else int(bool(code)), caught.out, caught.err)
+
+    return run
+
+
+@pytest.fixture
+def replay(cli: Cli, made_up_costs: Path) -> Cli:
+    """Runs `stsem replay ARGUMENTS` with the made-up costs and without plots."""
+
+    def run(*arguments: object) -> Ran:
+        costs = () if "--costs" in arguments or "--clock" in arguments else ("--costs", made_up_costs)
+        return cli("replay", *arguments, *costs, "--no-plots")
+
+    return run
