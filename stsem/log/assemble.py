@@ -23,7 +23,7 @@ from stsem.log.plan import clock_offset_ns, out_of_range
 from stsem.log.poses import PoseSource, stamped_poses, transform_chain
 from stsem.log.reading import ImageChannel
 from stsem.log.scan import Scan
-from stsem.log.tracks import Track
+from stsem.log.tracks import IMAGES, Track
 
 REGISTERED = ("auto", "yes", "no")
 
@@ -76,7 +76,7 @@ def assemble(
     asked = check_overrides(topics, tracks)
     channels = {
         id(t): ImageChannel(t, store, scan.damage)
-        for t in tracks if t.kind in (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO) and t.count
+        for t in tracks if t.kind in IMAGES and t.count
     }  # fmt: skip
     images = [Candidate(channel.track, channel.look()) for channel in channels.values()]
     color = _asked(images, asked, "color") or choose_color(images, tracks)

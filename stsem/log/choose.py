@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from stsem.errors import ChannelError, UsageError
 from stsem.log.messages import Kind
 from stsem.log.pixels import Look
-from stsem.log.tracks import Track
+from stsem.log.tracks import IMAGES, Track
 
 ROLES = ("color", "depth", "pose", "labels")
 TRANSPORTS = frozenset({"compressed", "compresseddepth", "raw", "theora", "ffmpeg", "zstd", "draco"})
@@ -85,7 +85,7 @@ def check_overrides(topics: Mapping[str, str], tracks: Sequence[Track]) -> dict[
         fitting = [track for track in tracks if track.topic == topic]
         if not fitting:
             raise ChannelError(f"The log has no topic {topic!r} for {role}; it has {_nearest_first(topic, tracks)}.")
-        kinds = (Kind.POSE, Kind.TRANSFORMS) if role == "pose" else (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO)
+        kinds = (Kind.POSE, Kind.TRANSFORMS) if role == "pose" else IMAGES
         track = max(fitting, key=lambda t: (t.kind in kinds, t.count))
         if track.kind not in kinds:
             what = "poses or transforms" if role == "pose" else "images"

@@ -82,6 +82,10 @@ class PoseSource:
 
     def trajectory(self) -> Trajectory:
         """T_WC at every stamp of `stamps_ns` at which the whole chain is known."""
+        moving = [edge for edge in self.edges if not edge.static]
+        if len(moving) == 1:
+            factors = [e.trajectory.poses[0] if e.static else e.trajectory.poses for e in self.edges]
+            return Trajectory(moving[0].trajectory.stamps_ns, reduce(np.matmul, factors))
         known = [(int(stamp), found.T_WC) for stamp in self.stamps_ns() if (found := self.at(int(stamp)))]
         stamps = np.array([stamp for stamp, _ in known], np.int64)
         return Trajectory(stamps, np.array([pose for _, pose in known], np.float64).reshape(-1, 4, 4))

@@ -1,6 +1,7 @@
 """What the scan keeps of each channel: for images a compact reference per message, for small messages their content."""
 
 from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from stsem.log.messages import Calibration, ClassNames, Decoded, Kind, Transform
 Int64 = npt.NDArray[np.int64]
 Float64 = npt.NDArray[np.float64]
 MAX_NS = 1 << 63
+IMAGES = (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO)
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,8 @@ class Track:
         self._damage = damage
         self._behind_stamp = b""
         self._previous_log_ns: int | None = None
-        self._columns = [array("q") for _ in range(5)]
+        self._times = [array("q"), array("q")]
+        self._where = [array("q"), array("q"), array("q")]
         if self.row is not None:
             self._make_readers(self.row, schema)
 
@@ -115,13 +118,14 @@ class Track:
             stamp_ns = self._take(self.row, self.decode, payload, log_ns)
         except Exception:  # noqa: BLE001  any error of a foreign parser means: undecodable
             self._damage.undecodable(self.topic, place, offset)
-            if self.row.kind not in (Kind.IMAGE, Kind.COMPRESSED):
+            if self.row.kind not in IMAGES:
                 return
         if stamp_ns is None:
             self.unstamped += 1
             stamp_ns = log_ns
-        for column, value in zip(self._columns, (stamp_ns, log_ns, place, offset, len(payload)), strict=True):
-            column.append(value)
+        _append(self._times, (stamp_ns, log_ns))
+        if self.row.kind in IMAGES:
+            _append(self._where, (place, offset, len(payload)))
 
     def _count(self, log_ns: int) -> None:
         self.count += 1
@@ -153,14 +157,16 @@ class Track:
         return plausible(message.stamp_ns)
 
     def references(self) -> References:
-        """All stamped messages, in order."""
-        stamp, log, place, offset, length = (_as_int64(column) for column in self._columns)
+        """Where the images are, in order; other messages have been read and are not looked up again."""
+        if self.kind not in IMAGES:
+            return References(*(np.zeros(0, np.int64) for _ in range(5)))
+        stamp, log, place, offset, length = (_as_int64(column) for column in (*self._times, *self._where))
         order = np.lexsort((offset, place, log, stamp))
         return References(stamp[order], log[order], place[order], offset[order], length[order])
 
     def stamp_offsets_ns(self) -> Int64:
-        """(n,) log time minus stamp of every stamped message, in file order."""
-        return _as_int64(self._columns[1]) - _as_int64(self._columns[0])
+        """(n,) log time minus stamp of every message that was read, in file order."""
+        return _as_int64(self._times[1]) - _as_int64(self._times[0])
 
 
 def plausible(stamp_ns: int | None) -> int | None:
@@ -168,6 +174,11 @@ def plausible(stamp_ns: int | None) -> int | None:
     if stamp_ns is not None and not 0 < stamp_ns < MAX_NS:
         raise ValueError(f"{stamp_ns} ns is no time")
     return stamp_ns
+
+
+def _append(columns: "Sequence[array[int]]", values: Sequence[int]) -> None:
+    for column, value in zip(columns, values, strict=True):
+        column.append(value)
 
 
 def _as_int64(column: "array[int]") -> Int64:

@@ -61,6 +61,7 @@ def test_every_container_gives_the_same_index(tmp_path: Path, options: dict[str,
         ours, theirs = track.references(), other.tracks[key].references()
         for column in ("stamp_ns", "log_ns", "length"):
             np.testing.assert_array_equal(getattr(ours, column), getattr(theirs, column))
+        np.testing.assert_array_equal(track.stamp_offsets_ns(), other.tracks[key].stamp_offsets_ns())
 
 
 def test_the_sha256_is_that_of_the_file(room_log: Path) -> None:
