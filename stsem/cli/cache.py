@@ -4,7 +4,7 @@ import typer
 
 from stsem.cli.launch import verb
 
-app = typer.Typer(help="Show or clear what is kept between runs.", no_args_is_help=True)
+app = typer.Typer(help="Show or clear what is kept between runs.")
 
 
 @app.command("show", help="Where the cache is, and how large.")

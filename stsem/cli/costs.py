@@ -8,7 +8,7 @@ import typer
 
 from stsem.cli.launch import verb
 
-app = typer.Typer(help="Measure or scale cost profiles.", no_args_is_help=True)
+app = typer.Typer(help="Measure or scale cost profiles.")
 
 
 @app.command("measure", help="Measure what every stage costs on this machine, on frames of a log.")
@@ -28,11 +28,13 @@ def measure(
     from stsem.log.log import open_log
     from stsem.replay.build import build_model
     from stsem.replay.calibrate import measure as calibrate
-    from stsem.replay.config import RunConfig
     from stsem.replay.costing import calibration_frames, subject
     from stsem.replay.engine import can_map
+    from stsem.replay.settings import validated
 
-    config = RunConfig(model=model, propagation=propagation, backend=backend, precision=precision, count_decode=True)
+    config = validated(
+        {"model": model, "propagation": propagation, "backend": backend, "precision": precision, "count_decode": True}
+    )
     with open_log([log]) as opened:
         fused = can_map(opened, config)
         frames = calibration_frames(opened, fused=fused)

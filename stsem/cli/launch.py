@@ -4,13 +4,27 @@ import functools
 import os
 import sys
 from collections.abc import Callable
-from typing import ParamSpec
+from typing import NoReturn, ParamSpec, cast
 
 import typer
 
-from stsem.errors import EXIT_ERROR, EXIT_FINE, StsemError
+from stsem.errors import EXIT_ERROR, EXIT_FINE, EXIT_USAGE, StsemError
 
 P = ParamSpec("P")
+_Misused = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
+"""The parent of every complaint about arguments; typer gives it no public name."""
+
+
+def launch(app: typer.Typer) -> NoReturn:
+    """Run the command line of this process; a flag that cannot be is one sentence on stderr, too."""
+    try:
+        code = app(standalone_mode=False)
+    except _Misused as err:
+        text = " ".join(err.format_message().split()).rstrip(".")
+        code = _say(f"{text}; --help shows what there is.", EXIT_USAGE)
+    except typer.Abort:
+        code = EXIT_ERROR
+    sys.exit(code)
 
 
 def verb(function: Callable[P, int | None]) -> Callable[P, None]:

@@ -6,13 +6,14 @@ import typer
 
 from stsem import __version__
 from stsem.cli import cache, costs, gate, inspect, replay, synth
+from stsem.cli.launch import launch
+from stsem.errors import EXIT_USAGE
 
 _SETTINGS = {"help_option_names": ["-h", "--help"]}
 
 app = typer.Typer(
     name="stsem",
     help="How accurate, how late and how fast a semantic scene-mapping pipeline is on your recorded logs.",
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings=_SETTINGS,
 )
@@ -30,20 +31,23 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(invoke_without_command=True)
 def _stsem(
+    context: typer.Context,
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show it.")] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(EXIT_USAGE)
 
 
 def stsem() -> None:
     """Entry point of `stsem`."""
-    app()
+    launch(app)
 
 
 def stsem_replay() -> None:
     """Entry point of `stsem-replay`."""
     single = typer.Typer(pretty_exceptions_enable=False, context_settings=_SETTINGS)
     single.command("stsem-replay", help=replay.HELP)(replay.replay)
-    single()
+    launch(single)

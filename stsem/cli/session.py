@@ -45,13 +45,20 @@ class Session:
 
 def replay_all(recordings: Sequence[tuple[Path, ...]], config: RunConfig) -> int:
     """Replay each recording into a report of its own; returns the largest exit code."""
-    codes = []
-    for paths in recordings:
-        out = config.out
-        if out is not None and len(recordings) > 1:
-            out = out / paths[0].stem
-        codes.append(_replay_one(paths, config, out))
-    return max(codes)
+    folders = _folders(recordings, config.out)
+    return max(_replay_one(paths, config, out) for paths, out in zip(recordings, folders, strict=True))
+
+
+def _folders(recordings: Sequence[tuple[Path, ...]], out: Path | None) -> list[Path | None]:
+    """Where each report goes: `out` itself for one log, else below it by name; None is the default place."""
+    if out is None or len(recordings) == 1:
+        return [out] * len(recordings)
+    names = [paths[0].stem for paths in recordings]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise UsageError(
+            f"Two logs are named {twice[0]}, but --out gives each log a folder of its name; replay them one by one."
+        )
+    return [out / name for name in names]
 
 
 def _replay_one(paths: tuple[Path, ...], config: RunConfig, out: Path | None) -> int:

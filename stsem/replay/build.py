@@ -128,7 +128,7 @@ def _network_segmenter(network: Network, table: Labels, log: Log, config: RunCon
     inferencer = Inferencer(network, backend=config.backend, precision=config.precision, threads=threads)
     if config.costs == "measured":
         return NetworkSegmenter(inferencer, table)
-    if not config.cache:
+    if not config.cache or config.repeat > 1:  # an answer read back would hide that the network does not repeat
         return Memo(NetworkSegmenter(inferencer, table))
     cache = OutputCache(cache_root(), log.info.sha256, inferencer.identity)
     return Memo(NetworkSegmenter(CachedInferencer(inferencer, cache), table))

@@ -22,6 +22,9 @@ def _number_as_text(value: object) -> object:
     return str(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
+LONGEST_S = 1e9
+"""No duration is longer: 31 years fit into integer nanoseconds with room to spare."""
+
 Switch = Annotated[bool, BeforeValidator(_on_off)]
 Text = Annotated[str, BeforeValidator(_number_as_text)]
 Where: dict[str, JsonValue] = {"where": True}
@@ -35,7 +38,7 @@ class RunConfig(BaseModel):
         pydantic.ValidationError: a value that cannot be (turned into a sentence by `stsem.replay.settings`).
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     mode: str = Field("per-frame,keyframe", description="Modes to run, comma separated, or 'both'.")
     model: str = Field("default", description="Shipped network, a FILE.onnx with its sidecar .toml, or 'oracle'.")
@@ -44,7 +47,9 @@ class RunConfig(BaseModel):
     keyframes: str = Field("paper", description="Keyframe policy: 'paper' or 'every:N'.")
     keyframe_rotation: float = Field(0.1, gt=0, description="paper: threshold on |H[:2,:2] - I|_F.")
     keyframe_translation: float = Field(0.15, gt=0, description="paper: threshold on |H[:2,2]|, in image widths.")
-    keyframe_time_s: float = Field(1.0, gt=0, description="paper: longest time between keyframes, seconds.")
+    keyframe_time_s: float = Field(
+        1.0, gt=0, le=LONGEST_S, description="paper: longest time between keyframes, seconds."
+    )
     propagation: str = Field("homography", description="How frames between keyframes are predicted.")
     pose: Literal["log"] = Field("log", description="Where the camera's pose comes from.")
     map: Switch = Field(True, description="Build the labelled map where the log has depth and poses.")
@@ -56,7 +61,7 @@ class RunConfig(BaseModel):
     queue: str = Field("latest", description="What waits for the pipeline: 'latest', 'fifo:N' or 'lossless'.")
     cores: int = Field(2, ge=1, le=64, description="Simulated cores.")
     deadline_ms: float | None = Field(
-        None, gt=0, description="Deadline from arrival; default the capture period / rate."
+        None, gt=0, le=1000 * LONGEST_S, description="Deadline from arrival; default the capture period / rate."
     )
     costs: str = Field("auto", description="'auto', 'measured', a profile, or the trace.json of an earlier run.")
     seed: int = Field(0, ge=0, description="Seed of every draw.")
@@ -64,9 +69,11 @@ class RunConfig(BaseModel):
     offline: Switch = Field(True, description="Also measure the accuracy without a clock.")
     sustainable: Switch = Field(False, description="Search for the highest rate that the pipeline sustains.")
     topic: dict[Literal["color", "depth", "pose", "labels"], str] = Field({}, description="Channels to use, by role.")
-    start: float | None = Field(None, ge=0, description="Start of the window, seconds from the first colour stamp.")
+    start: float | None = Field(
+        None, ge=0, le=LONGEST_S, description="Start of the window, seconds from the first colour stamp."
+    )
     end: float | None = Field(
-        None, gt=0, description="End of the window, seconds from the first colour stamp, exclusive."
+        None, gt=0, le=LONGEST_S, description="End of the window, seconds from the first colour stamp, exclusive."
     )
     classes: Path | None = Field(None, description="Class table of the truth.", json_schema_extra=Where)
     class_map: Path | None = Field(None, description="TOML: network class = log class.", json_schema_extra=Where)

@@ -49,9 +49,18 @@ def resolve(
         for key, value in values.items():
             if key not in keys():
                 raise UsageError(f"Unknown key {key!r} in {source}{nearest(key, keys())}.")
-            merged[key] = {**merged.get(key, {}), **value} if isinstance(value, dict) else value
+            merged[key] = _joined(merged.get(key), value)
+    return validated(merged)
+
+
+def validated(values: Mapping[str, Any]) -> RunConfig:
+    """A configuration from values by key.
+
+    Raises:
+        UsageError: a value that cannot be.
+    """
     try:
-        return RunConfig.model_validate(merged)
+        return RunConfig.model_validate(values)
     except ValidationError as err:
         raise UsageError(sentence(err)) from err
 
@@ -100,8 +109,13 @@ def _from_assignments(assignments: Iterable[str]) -> dict[str, Any]:
         if not equals:
             raise UsageError(f"--set takes key=value, but {text!r} came.")
         head, _, tail = key.strip().partition(".")
-        values[head] = {**values.get(head, {}), tail: _literal(value)} if tail else _literal(value)
+        values[head] = _joined(values.get(head), {tail: _literal(value)} if tail else _literal(value))
     return values
+
+
+def _joined(earlier: Any, later: Any) -> Any:
+    """`later`, or both when they are tables: a source may set one entry and leave the others."""
+    return {**earlier, **later} if isinstance(earlier, dict) and isinstance(later, dict) else later
 
 
 def _literal(text: str) -> Any:
