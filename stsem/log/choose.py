@@ -114,7 +114,10 @@ def choose_color(images: Sequence[Candidate], everything: Sequence[Track]) -> Ca
                 f"The only camera {videos[0].topic} holds {videos[0].look.name} video, which stsem does not decode; "
                 "record or convert it as jpeg, png or raw images."
             )
-        there = ", ".join(f"{t.topic} ({t.schema or t.encoding})" for t in everything) or "no channel at all"
+        there = (
+            ", ".join(f"{t.topic} ({t.schema or t.encoding}, {t.count} messages)" for t in everything)
+            or "no channel at all"
+        )
         raise ChannelError(f"The log has no colour images; it has {there}; give --topic color=TOPIC if one of them is.")
     best = [max(group, key=_within_camera) for group in cameras.values()]
     claim = max(candidate.claim for candidate in best)

@@ -11,7 +11,7 @@ import numpy as np
 
 from stsem.camera import Camera
 from stsem.classes import ClassSet, Labels
-from stsem.errors import DecodeError
+from stsem.errors import ChannelError, DecodeError
 from stsem.frame import Depth, Frame, Image
 from stsem.log import pixels
 from stsem.log.assemble import Assembly, assemble
@@ -86,8 +86,10 @@ def open_log(
         assembly = assemble(scanned, store, topics or {}, classes_file, depth_registered)
         rows = window(assembly.color.rows.stamp_ns, start_s, end_s)
         return Log(assembly, describe(paths, scanned, assembly), store, rows)
-    except BaseException:
+    except BaseException as err:
         store.close()
+        if isinstance(err, ChannelError) and scanned.damage.lossy:
+            raise ChannelError(f"{str(err).rstrip('.')}; the log is damaged: {scanned.damage}.") from err
         raise
 
 

@@ -122,7 +122,10 @@ def test_two_equal_cameras_are_listed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("topics", "words"),
     [
-        ({"/pose": "pose"}, "no colour images; it has /pose (geometry_msgs/msg/PoseStamped); give --topic color=TOPIC"),
+        (
+            {"/pose": "pose"},
+            "no colour images; it has /pose (geometry_msgs/msg/PoseStamped, 3 messages); give --topic color=TOPIC",
+        ),
         ({"/cam/h264": "h264"}, "The only camera /cam/h264 holds h264 video, which stsem does not decode"),
         ({"/cam": "bayer"}, "No image of /cam can be decoded: encoding 'bayer_rggb8' is not supported, only rgb8"),
     ],

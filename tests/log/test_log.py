@@ -10,7 +10,7 @@ import pytest
 from made_up_logs import BASE_NS, LEVEL, NS, PERIOD_NS, ROS, Recorder, label_picture, picture, png, room
 
 from stsem.camera import Camera
-from stsem.errors import DecodeError, LogError, UsageError
+from stsem.errors import ChannelError, DecodeError, LogError, UsageError
 from stsem.log.log import Loaded, Log, open_log
 
 BOTH = frozenset({"depth", "pose"})
@@ -331,6 +331,14 @@ def test_a_damaged_log_is_opened_and_lossy(room_log: Path) -> None:
             assert one.frame is not None
             np.testing.assert_array_equal(one.frame.image, picture(i))
         assert log.info.damage.as_dict() == {"lossy": True, "counts": {"truncated": {"": 1}}}
+
+
+def test_a_log_with_nothing_left_names_its_damage(room_log: Path) -> None:
+    room_log.write_bytes(room_log.read_bytes()[:500])
+    with pytest.raises(
+        ChannelError, match=r"no colour images; it has no channel at all; .*; the log is damaged: truncated 1\.$"
+    ):
+        open_log([room_log])
 
 
 def test_closing_in_mid_run_leaves_no_thread_and_no_file(room_log: Path) -> None:
