@@ -90,7 +90,7 @@ def _of_log(path: Path) -> Iterator[Sample]:
 def _judge(args: argparse.Namespace) -> None:
     set_threads(1)
     inferencer = Inferencer(load_network(args.network), threads=args.threads)
-    matrix = ConfusionMatrix(OFFICE)
+    matrix = ConfusionMatrix(len(OFFICE))
     spent = []
     for image, previous, truth in _of_log(args.log) if args.log else _of_pairs(args.pairs, args.prefix):
         begun = hostclock.wall_ns()

@@ -23,7 +23,8 @@ ARCHITECTURES: dict[str, Architecture] = {
     "pspnet-r50": _both(ResNetSpec(50)),  # the paper's
     "pspnet-r18": _both(ResNetSpec(18)),
     "pspnet-r18-w4": _both(ResNetSpec(18, 4 / 16)),  # width in sixteenths
-    "pspnet-r18-w6-w3": Architecture(ResNetSpec(18, 6 / 16), ResNetSpec(18, 3 / 16)),  # the shipped one
+    "pspnet-r18-w4-w2": Architecture(ResNetSpec(18, 4 / 16), ResNetSpec(18, 2 / 16)),  # the shipped one
+    "pspnet-r18-w6-w4": Architecture(ResNetSpec(18, 6 / 16), ResNetSpec(18, 4 / 16)),
     "pspnet-r50-spatial": Architecture(ResNetSpec(50), None),
     "pspnet-r18-spatial": Architecture(ResNetSpec(18), None),
 }

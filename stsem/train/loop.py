@@ -1,23 +1,30 @@
 """The training loop: pairs in, checkpoints out. Any iteration can be repeated: its draws are keyed by its number."""
 
+import copy
 import zipfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.optim.swa_utils import AveragedModel
 
 from stsem import chance
 from stsem.errors import TrainingError
 from stsem.inference.preprocess import difference_input, image_input
 from stsem.inference.sidecar import Sidecar
+from stsem.models.two_stream import OneStream, TwoStream
 from stsem.models.zoo import build
 from stsem.train.augment import Augmentation, View, view
 from stsem.train.dataset import PairFolder
 from stsem.train.objective import Objective
+
+Tensors = tuple[torch.Tensor, ...] | list[torch.Tensor]
+CLIP = 5.0
+"""Largest norm of the gradient of all weights together."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +38,9 @@ class Schedule:
         power, decay: of the fall, and weight decay.
         average: factor of the running mean of the weights, which is what gets published.
         seed: of every draw.
-        bf16: convolutions in bfloat16 where the processor gains by it.
+        workers: threads that each take an equal part of the batch through a replica of the network. On a busy machine
+            this beats threads inside the operators, which wait for each other at every one of them. With more than one,
+            their dropout masks interleave, so that a repeated iteration is alike but not equal.
         checkpoint_every: iterations between checkpoints.
     """
 
@@ -43,7 +52,7 @@ class Schedule:
     decay: float = 1e-2
     average: float = 0.998
     seed: int = 0
-    bf16: bool = False
+    workers: int = 1
     checkpoint_every: int = 200
 
     def rate_at(self, iteration: int) -> float:
@@ -81,9 +90,10 @@ class Training:
         self._how, self._schedule = how, schedule
         self.network = build(architecture, len(sidecar.classes))
         self.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-        average = get_ema_multi_avg_fn(schedule.average)  # type: ignore[no-untyped-call]
-        self._mean = AveragedModel(self.network, multi_avg_fn=average, use_buffers=True)
+        self._mean = AveragedModel(self.network, multi_avg_fn=_running_mean(schedule.average), use_buffers=True)
         self._optimiser = torch.optim.AdamW(self.network.parameters(), schedule.rate, weight_decay=schedule.decay)
+        self._replicas = [self.network, *(_replica(self.network) for _ in range(schedule.workers - 1))]
+        self._pool = ThreadPoolExecutor(schedule.workers)
         self.iteration = 0
 
     def run(self, pairs: PairFolder, checkpoint: Path, report: Callable[[Progress], None], every: int = 20) -> None:
@@ -100,23 +110,27 @@ class Training:
                 self.save(checkpoint)
 
     def _step(self, pairs: PairFolder) -> float:
-        image, difference, labels = self._batch(pairs)
         torch.manual_seed(chance.hash31(self._schedule.seed, "dropout", self.iteration))
         for group in self._optimiser.param_groups:
             group["lr"] = self._schedule.rate_at(self.iteration)
-        self.network.train()
-        loss = self._objective(self.network, image, difference, labels)
-        self._optimiser.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
+        losses = list(self._pool.map(lambda worker: self._differentiate(worker, pairs), range(len(self._replicas))))
+        for first, *others in zip(*(replica.parameters() for replica in self._replicas), strict=True):
+            first.grad = sum((other.grad for other in others), start=first.grad)
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), CLIP)
         self._optimiser.step()
         self._mean.update_parameters(self.network)
-        return float(loss.detach())
+        return sum(losses)
 
-    def _batch(self, pairs: PairFolder) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        rng = chance.generator(self._schedule.seed, "batch", self.iteration)
-        chosen = rng.integers(len(pairs), size=self._schedule.batch)
-        return tensors([view(pairs.pair(int(i)), self._how, rng) for i in chosen], self._sidecar)
+    def _differentiate(self, worker: int, pairs: PairFolder) -> float:
+        """Gradients of one worker's part of the batch, in its replica."""
+        rng = chance.generator(self._schedule.seed, "batch", self.iteration, worker)
+        chosen = rng.integers(len(pairs), size=self._schedule.batch // len(self._replicas))
+        views = [view(pairs.pair(int(i)), self._how, rng) for i in chosen]
+        network = self._replicas[worker].train()
+        network.zero_grad(set_to_none=True)
+        loss = self._objective(network, *tensors(views, self._sidecar)) / len(self._replicas)
+        loss.backward()  # type: ignore[no-untyped-call]
+        return float(loss.detach())
 
     def save(self, path: Path) -> None:
         """Write everything that is needed to go on, aside and renamed."""
@@ -150,6 +164,25 @@ class Training:
         """Begin with the averaged weights of a checkpoint of the same architecture. Raises TrainingError."""
         self.network.load_state_dict(averaged_weights(read_checkpoint(path)))
         self._mean.module.load_state_dict(self.network.state_dict())
+
+
+def _running_mean(factor: float) -> Callable[[Tensors, Tensors, torch.Tensor | int], None]:
+    """Exponential mean whose factor starts low: after n updates at most (1 + n) / (10 + n), or noise would linger."""
+
+    def update(means: Tensors, values: Tensors, count: torch.Tensor | int) -> None:
+        kept = min(factor, (1 + int(count)) / (10 + int(count)))
+        for mean, value in zip(means, values, strict=True):
+            mean.lerp_(value, 1 - kept) if mean.is_floating_point() else mean.copy_(value)
+
+    return update
+
+
+def _replica(network: TwoStream | OneStream) -> TwoStream | OneStream:
+    """The same weights in the same memory, with gradients and batch statistics of its own."""
+    twin = copy.deepcopy(network)
+    for own, shared in zip(twin.parameters(), network.parameters(), strict=True):
+        own.data = shared.data
+    return twin
 
 
 def tensors(views: list[View], sidecar: Sidecar) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

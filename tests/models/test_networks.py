@@ -90,7 +90,7 @@ def test_names_build_what_they_say() -> None:
         assert _parameters(build("pspnet-r50", 13)) / 1e6 == pytest.approx(98, abs=1)
     with pytest.raises(UsageError, match=r"'pspnet'; choose one of pspnet-r50"):
         build("pspnet", 13)
-    assert "pspnet-r18-w6-w3" in ARCHITECTURES
+    assert "pspnet-r18-w4-w2" in ARCHITECTURES
 
 
 @pytest.mark.parametrize("streams", [1, 2])
