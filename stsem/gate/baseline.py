@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, JsonValue, ValidationError
 
 from stsem.document.canonical import canonical, document_from, results_digest
 from stsem.document.origin import Identity
@@ -21,6 +21,10 @@ GATED = (
     "latency_ms.from_arrival.max", "throughput.output_hz", "throughput.processed_share", "coverage.scored",
 )  # fmt: skip
 """Paths inside a run that a baseline keeps."""
+
+WINDOW = ("start", "end")
+SIMULATION = ("rate", "queue", "cores", "seed", "count_decode")
+"""Keys of the configuration that make another experiment: which frames, and what the simulated clock does with them."""
 
 
 class BaselineRun(Part):
@@ -57,6 +61,8 @@ class Baseline(Part):
     """Classes of the log."""
     identity: Identity
     """Network, backend, versions and costs."""
+    conditions: dict[str, JsonValue] = Field(default_factory=dict)
+    """The configuration's window and simulation: they make another experiment, where thresholds do not."""
     runs: tuple[BaselineRun, ...] = Field(min_length=1)
     """One per mode."""
 
@@ -82,6 +88,7 @@ def make_baseline(document: Document) -> Baseline:
         logs={log.name: log.sha256 for log in document.input.logs},
         classes=document.input.classes,
         identity=document.identity,
+        conditions={key: document.config[key] for key in (*WINDOW, *SIMULATION) if key in document.config},
         runs=tuple(_kept(run) for run in document.runs),
     )
 
@@ -109,14 +116,15 @@ def baseline_bytes(baseline: Baseline) -> bytes:
 
 
 def read_baseline(path: Path) -> Baseline:
-    """Read a baseline, or make one from a report.json.
+    """Read a baseline, or make one from a report.json or a report's folder.
 
     Raises:
         NothingMeasuredError: there is no such file, so there is nothing to compare with.
         UsageError: the file is neither a baseline nor a report of this version.
     """
+    file = path / "report.json" if path.is_dir() else path
     try:
-        values = json.loads(path.read_bytes())
+        values = json.loads(file.read_bytes())
     except OSError as err:
         raise NothingMeasuredError(
             f"There is no baseline {path} ({err.strerror}); make one from a good report with --write-baseline."

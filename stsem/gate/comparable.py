@@ -1,7 +1,9 @@
 """Whether two reports can be compared at all, and how their installations differ."""
 
+import json
+
 from stsem.document.origin import Identity
-from stsem.gate.baseline import Baseline
+from stsem.gate.baseline import SIMULATION, WINDOW, Baseline
 
 
 def obstacles(base: Baseline, head: Baseline, timing: bool) -> tuple[str, ...]:
@@ -24,7 +26,9 @@ def obstacles(base: Baseline, head: Baseline, timing: bool) -> tuple[str, ...]:
             found.append(f"The baseline has the mode {run.mode}, the report only {', '.join(clocks) or 'none'}.")
         elif clocks[run.mode] != run.clock:
             found.append(f"The baseline ran {run.mode} on the {run.clock} clock, the report {clocks[run.mode]}.")
+    found += _conditions(base, head, WINDOW)
     if timing and any(run.clock == "real-time" for run in base.runs):
+        found += _conditions(base, head, SIMULATION)
         found += _costs(base.identity, head.identity)
     return tuple(found)
 
@@ -39,6 +43,15 @@ def _classes(base: tuple[str, ...], head: tuple[str, ...]) -> str:
         return "The classes stand in another order than in the baseline."
     changes = [f"without {', '.join(gone)}"] * bool(gone) + [f"with {', '.join(new)}"] * bool(new)
     return f"The report's classes differ from the baseline's: {' and '.join(changes)}."
+
+
+def _conditions(base: Baseline, head: Baseline, keys: tuple[str, ...]) -> list[str]:
+    changed = [key for key in keys if base.conditions.get(key) != head.conditions.get(key)]
+    return [
+        f"The baseline ran with {key} = {json.dumps(base.conditions.get(key))}, the report with "
+        f"{json.dumps(head.conditions.get(key))}: another experiment."
+        for key in changed
+    ]
 
 
 def _costs(base: Identity, head: Identity) -> list[str]:

@@ -33,15 +33,15 @@ def _counts(verdict: GateVerdict) -> str:
 
 
 def _table(checks: tuple[Check, ...]) -> str:
-    head = "| mode | metric | base | head | change | allowed | |\n|---|---|--:|--:|--:|--:|---|"
+    head = "| mode | metric | base | head | change (+ is better) | allowed | |\n|---|---|--:|--:|--:|--:|---|"
     return "\n".join([head, *(_row(check) for check in checks)])
 
 
 def _row(check: Check) -> str:
-    change = "" if check.change is None else f"{check.change:+.2f} {check.unit}".strip()
-    limit = "equal" if check.metric in ("outcomes", "results") else "" if check.limit is None else _allowed(check)
-    values = (_value(check, check.base), _value(check, check.head))
-    return f"| {check.mode} | {check.name} | {values[0]} | {values[1]} | {change} | {limit} | {_MARKS[check.mark]} |"
+    change = "–" if check.change is None else f"{check.change:+.2f} {check.unit}".strip()
+    limit = "equal" if check.metric in ("outcomes", "results") else "–" if check.limit is None else _allowed(check)
+    cells = (check.mode or "all", check.name, _value(check, check.base), _value(check, check.head), change, limit)
+    return f"| {' | '.join(cells)} | {_MARKS[check.mark]} |"
 
 
 def _allowed(check: Check) -> str:
@@ -50,7 +50,7 @@ def _allowed(check: Check) -> str:
 
 def _value(check: Check, value: float | None) -> str:
     if value is None:
-        return "" if check.metric in ("outcomes", "results") else "not measured"
+        return "–" if check.metric in ("outcomes", "results") else "not measured"
     if check.unit == "points":
         return f"{100 * value:.2f} %"
     if check.metric.startswith("latency_ms"):

@@ -25,7 +25,7 @@ def outline(document: Document, pictures: frozenset[str], strip_pass: str = "off
         pictures: names of the pictures that were drawn; the others are left out.
         strip_pass: which pass the answers in the strip come from.
     """
-    makers = (*_RESULTS, *([lambda _: _strip(strip_pass)] if "strip" in pictures else []), *_BASIS)
+    makers = (*_RESULTS, *([lambda _: _strip(document, strip_pass)] if "strip" in pictures else []), *_BASIS)
     sections = [section for make in makers if (section := make(document)) is not None]
     return Outline(
         title=headline.report_title(document),
@@ -39,8 +39,9 @@ def outline(document: Document, pictures: frozenset[str], strip_pass: str = "off
     )
 
 
-def _strip(strip_pass: str) -> Section:
-    text = f"Answers of the {strip_pass} pass. Errors are coloured by the mode that made them."
+def _strip(document: Document, strip_pass: str) -> Section:
+    judged = document.accuracy_state == "measured"
+    text = f"Answers of the {strip_pass} pass." + " Errors are coloured by the mode that made them." * judged
     return Section("Frames", (Figure("strip", "image, truth, answers and errors of some frames"), Text(text)))
 
 

@@ -9,7 +9,9 @@ from markupsafe import Markup, escape
 
 from stsem.report.outline import Block, Outline
 from stsem.report.plots.gallery import Picture
-from stsem.report.plots.style import MODE_COLOURS
+from stsem.report.plots.style import MODE_COLOURS, PNG_DPI
+
+CSS_DPI = 96
 
 
 def html(report: Outline, pictures: Mapping[str, Picture]) -> str:
@@ -57,4 +59,5 @@ def _picture(picture: Picture) -> Markup:
     if picture.svg is not None:
         return Markup(picture.svg)
     data = base64.b64encode(picture.png).decode()
-    return Markup('<img alt="" src="data:image/png;base64,{}">').format(data)
+    width = int.from_bytes(picture.png[16:20]) * CSS_DPI // PNG_DPI
+    return Markup('<img alt="" style="width: {}px" src="data:image/png;base64,{}">').format(width, data)

@@ -7,6 +7,7 @@ from tabulate import tabulate
 
 from stsem.document.schema import Document, Run
 from stsem.report.metrics import METRICS, row_delta, shown
+from stsem.report.wording import NOT_MEASURED
 
 _PATHS = ("offline.miou", "streaming.miou", "offline.pixel_accuracy", "latency_ms.from_arrival.p50",
           "latency_ms.from_arrival.p95", "throughput.output_hz")  # fmt: skip
@@ -17,7 +18,7 @@ _SCORE_KEYS = {"miou", "pixel_accuracy", "classes_averaged", "n"}
 def closing_table(document: Document) -> str:
     """One column per mode as plain text, then the paired difference, and the basis of the numbers below."""
     headers = ["", *(run.mode for run in document.runs)]
-    rows = [[METRICS[path].name, *(shown(run, path) for run in document.runs)] for path in _PATHS]
+    rows = [[METRICS[path].name, *(_shown(document, run, path) for run in document.runs)] for path in _PATHS]
     rows += [[name, *(str(get(run)) for run in document.runs)] for name, get in _COUNTS.items()]
     if document.comparison:
         headers.append("difference [95 % interval]")
@@ -73,6 +74,11 @@ def _summary(run: Run) -> JsonValue:
         "latency_ms": None if run.latency_ms is None else run.latency_ms.from_arrival.model_dump(mode="json"),
         "output_hz": None if run.throughput is None else run.throughput.output_hz,
     }  # fmt: skip
+
+
+def _shown(document: Document, run: Run, path: str) -> str:
+    judged = document.accuracy_state == "measured" or path.startswith(("latency_ms.", "throughput."))
+    return shown(run, path) if judged else NOT_MEASURED
 
 
 def _others(run: Run) -> int:

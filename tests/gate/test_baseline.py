@@ -26,12 +26,15 @@ def test_a_report_serves_as_baseline(tmp_path: Path) -> None:
     file = tmp_path / "report.json"
     file.write_bytes(to_bytes(BASE))
     assert read_baseline(file) == make_baseline(BASE)
+    assert read_baseline(tmp_path) == make_baseline(BASE)
 
 
 def test_no_baseline_is_nothing_measured(tmp_path: Path) -> None:
     """A cold start exits 5, it does not pass."""
     with pytest.raises(NothingMeasuredError, match="There is no baseline"):
         read_baseline(tmp_path / "none.json")
+    with pytest.raises(NothingMeasuredError, match="There is no baseline"):
+        read_baseline(tmp_path)
     with pytest.raises(NothingMeasuredError, match="cannot be a baseline"):
         make_baseline(BASE.model_copy(update={"state": "invalid"}))
 

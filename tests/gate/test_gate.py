@@ -113,6 +113,8 @@ def test_wrong_limits_are_named(limits: dict[str, float], sentence: str) -> None
         ({"runs.0.clock": "offline"}, "the real-time clock, the report offline"),
         ({"identity.costs_sha256": "00" * 32}, "The cost profiles differ"),
         ({"identity.costs_sha256": None}, "Measured costs are never gated"),
+        ({"config.end": 5.0}, "ran with end = null, the report with 5.0: another experiment"),
+        ({"config.queue": "lossless"}, 'ran with queue = "latest", the report with "lossless"'),
     ],
 )
 def test_what_is_not_comparable_never_passes(changes: dict[str, Any], sentence: str) -> None:
@@ -135,6 +137,13 @@ def test_other_costs_are_comparable_offline() -> None:
     verdict = gate(other, make_baseline(BASE), Limits(timing=False))
     assert verdict.exit_code == 0
     assert {check.metric.split(".")[0] for check in verdict.checks} == {"offline", "coverage"}
+
+
+def test_thresholds_may_differ_and_without_timing_the_simulation_too() -> None:
+    """A gate is for changes: of the model, of thresholds, of code."""
+    assert gate(changed(BASE, {"config.keyframes": "every:3"}), make_baseline(BASE)).exit_code == 0
+    assert gate(changed(BASE, {"config.rate": "2"}), make_baseline(BASE), Limits(timing=False)).exit_code == 0
+    assert gate(changed(BASE, {"config.end": 3.0}), make_baseline(BASE), Limits(timing=False)).exit_code == 5
 
 
 def test_a_metric_that_is_gone_fails_closed() -> None:

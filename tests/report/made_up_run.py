@@ -42,6 +42,8 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
             "model": "psp18",
             "keyframes": "paper",
             "propagation": "homography",
+            "start": None,
+            "end": None,
             "rate": 1,
             "queue": "latest",
             "cores": 2,

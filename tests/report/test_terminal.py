@@ -20,6 +20,7 @@ def test_closing_table_is_short_and_complete() -> None:
 def test_without_truth_it_says_so() -> None:
     table = closing_table(example(pictures=False, truth=False).document)
     assert "Accuracy was not measured: the log has no channel with labels." in table
+    assert table.count("not measured") == 3 * 2 + 1
     assert "nan" not in table.lower()
 
 

@@ -35,7 +35,7 @@ def draw(inputs: ReportInputs) -> Figure | None:
         pictures = _pictures(frame, modes, palette, seen, with_truth)
         for j, (name, picture) in enumerate(zip(titles, pictures, strict=True)):
             axes = figure.add_subplot(len(inputs.strip), len(titles), i * len(titles) + j + 1)
-            _cell(axes, picture, f"{name}" if i == 0 else "", _caption(frame, name, j, predicting))
+            _cell(axes, frame.image.shape[:2], picture, name if i == 0 else "", _caption(frame, name, j, predicting))
     handles = [Patch(color=_hex(palette[k]), label=classes.names[k]) for k in sorted(seen) if k < len(classes)]
     handles += [Patch(color="#000000", label="ignored, or no label")] * (NO_LABEL in seen)
     columns = len(titles) if with_truth else len(titles) + 2
@@ -98,15 +98,15 @@ def _hex(rgb: Sequence[int] | npt.NDArray[np.uint8]) -> str:
     return "#" + "".join(f"{int(c):02x}" for c in rgb)
 
 
-def _cell(axes: Axes, picture: Image | None, heading: str, caption: str) -> None:
+def _cell(axes: Axes, size: tuple[int, int], picture: Image | None, heading: str, caption: str) -> None:
     axes.set_xticks([])
     axes.set_yticks([])
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
+    blank = np.full((*size, 3), 246, np.uint8)
+    axes.imshow(blank if picture is None else picture, interpolation="nearest")
     if picture is None:
-        axes.text(0.5, 0.5, "none", ha="center", va="center", color=MUTED, transform=axes.transAxes)
-    else:
-        axes.imshow(picture, interpolation="nearest")
+        axes.text(0.5, 0.5, "none", ha="center", va="center", fontsize=9, color=MUTED, transform=axes.transAxes)
     if heading:
         axes.set_title(heading, fontsize=10, fontweight="bold", color=INK, loc="left")
     axes.set_xlabel(caption, fontsize=8, color=MUTED, loc="left", labelpad=2)

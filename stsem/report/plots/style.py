@@ -55,7 +55,7 @@ _RC: dict[Any, Any] = {
 }
 
 WIDTH_IN = 8.4
-_PNG_DPI = 150
+PNG_DPI = 150
 _TITLE_PT = 22
 
 
@@ -103,7 +103,7 @@ def apart(heights: Sequence[float], gap: float) -> list[float]:
 def png(figure: Figure) -> bytes:
     """The picture as PNG, without dates; the layout found for it stays."""
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=_PNG_DPI, metadata={"Software": None})
+    figure.savefig(out, format="png", dpi=PNG_DPI, metadata={"Software": None})
     figure.set_layout_engine("none")
     return out.getvalue()
 

@@ -44,7 +44,7 @@ def _comparison(comparison: Comparison) -> Table:
         "(so the delivered scores are lower here than in the other tables, which hold the answers alone). "
         "Intervals: block bootstrap over stretches of the log; `no clear difference` where the interval holds 0.",
         *no_intervals(comparison.rows),
-        *(score_meanings() if any(row.unit == "fraction" for row in comparison.rows) else ()),
+        *(score_meanings() if any(".miou" in row.metric for row in comparison.rows) else ()),
     )
     return Table(columns, rows, notes)
 
