@@ -74,10 +74,7 @@ def assemble(
         raise UsageError(f"--depth-registered is {depth_registered!r}, but it can be {', '.join(REGISTERED)}.")
     tracks = list(scan.tracks.values())
     asked = check_overrides(topics, tracks)
-    channels = {
-        id(t): ImageChannel(t, store, scan.damage)
-        for t in tracks if t.kind in IMAGES and t.count
-    }  # fmt: skip
+    channels = {id(t): ImageChannel(t, store, scan.damage) for t in tracks if t.kind in IMAGES and t.count}
     images = [Candidate(channel.track, channel.look()) for channel in channels.values()]
     color = _asked(images, asked, "color") or choose_color(images, tracks)
     result = Assembly(channels[id(color.track)], (0, 0))
@@ -93,13 +90,7 @@ def assemble(
     _find_camera(result, tracks, color)
     _find_poses(result, tracks, asked.get("pose"), color.look.frame_id)
     _find_clock_offsets(result)
-    result.warnings += [
-        t.trouble[0].upper() + t.trouble[1:] + "; its messages are not used." for t in tracks if t.trouble
-    ]
-    result.warnings += [
-        f"{c.track.unstamped} of {c.track.count} messages on {c.topic} have no capture stamp: their log time is used."
-        for c in (result.color, result.depth, result.labels) if c and c.track.unstamped
-    ]  # fmt: skip
+    _note_troubles(result, tracks)
     return result
 
 
@@ -227,6 +218,19 @@ def _find_poses(result: Assembly, tracks: Sequence[Track], asked: Track | None, 
         if track is not None and track.kind is Kind.POSE:
             result.poses, warnings = stamped_poses(track)
             result.warnings += warnings + ([warning] if warning else [])
+
+
+def _note_troubles(result: Assembly, tracks: Sequence[Track]) -> None:
+    for track in tracks:
+        if track.trouble:
+            result.warnings.append(f"{track.trouble[0].upper()}{track.trouble[1:]}; its messages are not used.")
+    used = {c.topic for c in (result.color, result.depth, result.labels) if c} | {result.pose_topic}
+    for track in tracks:
+        if track.unstamped and track.topic in used:
+            result.warnings.append(
+                f"{track.unstamped} of {track.count} messages on {track.topic} have no capture stamp: "
+                "their log time is used."
+            )
 
 
 def _find_clock_offsets(result: Assembly) -> None:
