@@ -189,6 +189,30 @@ def test_the_oracle_must_repeat_exactly() -> None:
     assert gate(oracle(BASE), make_baseline(oracle(BASE))).exit_code == 0
 
 
+def leaves(value: Any, path: str) -> list[str]:
+    """Paths of all numbers inside a JSON value."""
+    if isinstance(value, dict):
+        return [leaf for key, item in value.items() for leaf in leaves(item, f"{path}.{key}")]
+    if isinstance(value, list):
+        return [leaf for i, item in enumerate(value) for leaf in leaves(item, f"{path}.{i}")]
+    return [path] if isinstance(value, int | float) and not isinstance(value, bool) else []
+
+
+NUMBERS = [leaf for leaf in leaves(as_json(BASE)["runs"], "runs") if ".outcomes." not in leaf and leaf[7:] != "frames"]
+
+
+@given(st.sampled_from(NUMBERS))
+@settings(max_examples=60, derandomize=True, deadline=None)
+def test_no_number_of_an_oracle_run_can_change_unseen(path: str) -> None:
+    """One label, one latency, one keyframe: the smallest change of any number fails the gate."""
+    values: Any = as_json(BASE)
+    for key in path.split("."):
+        values = values[int(key) if key.isdigit() else key]
+    new = values + 1 if isinstance(values, int) else values * 0.999999 if values else 1e-9
+    verdict = gate(oracle(changed(BASE, {path: new})), make_baseline(oracle(BASE)))
+    assert verdict.exit_code == 4
+
+
 def test_the_oracles_outcomes_are_named() -> None:
     outcomes = {"runs.1.outcomes.dropped_busy": 2, "runs.1.outcomes.propagated": 124}
     verdict = gate(oracle(changed(BASE, outcomes)), make_baseline(oracle(BASE)))

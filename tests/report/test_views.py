@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from made_up_run import example
 
+from stsem.document.schema import MapScore, TrajectoryScore
 from stsem.report.contents import outline
 from stsem.report.html import html
 from stsem.report.inputs import ReportInputs
@@ -122,6 +123,30 @@ def test_reading_order_and_basis() -> None:
     assert any("Mean of the IoU over the classes that have truth pixels" in note for note in table.notes)
     assert [tile.value for tile in report.tiles] == ["70.4 %", "77.4 %", "16.1 ms", "9.92 Hz"]
     assert [tile.good for tile in report.tiles] == [True, False, True, True]
+
+
+def test_poses_and_map_in_units_of_readers() -> None:
+    inputs = example(pictures=False)
+    space = {
+        "trajectory": TrajectoryScore(tracked_share=0.875, ate_rmse_m=0.0123, n=100),
+        "map": MapScore(points=12345),
+    }
+    runs = tuple(run.model_copy(update=space) for run in inputs.document.runs)
+    text = markdown(outline(inputs.document.model_copy(update={"runs": runs}), frozenset()))
+    assert re.search(r"\| tracked share, % +\| +87\.5 \| +87\.5 \|", text)
+    assert re.search(r"\| ate rmse, m +\| +0\.012 \| +0\.012 \|", text)
+    assert re.search(r"\| points +\| +12 345 \| +12 345 \|", text)
+
+
+def test_what_was_not_measured_is_grouped_by_reason() -> None:
+    inputs = example(pictures=False)
+    first, second = inputs.document.runs
+    runs = (
+        first.model_copy(update={"not_measured": {"offline": "no truth", "throughput.sustainable_hz": "no truth"}}),
+        second.model_copy(update={"not_measured": {"offline": "no truth", "map": "no depth"}}),
+    )
+    text = markdown(outline(inputs.document.model_copy(update={"runs": runs}), frozenset()))
+    assert "- offline: no truth\n- throughput: sustainable hz: no truth (per-frame)\n- map: no depth (keyframe)" in text
 
 
 def test_text_from_the_log_cannot_break_the_page() -> None:

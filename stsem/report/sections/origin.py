@@ -5,7 +5,7 @@ import json
 from stsem.document.part import Part
 from stsem.document.schema import Document, MapScore, TrajectoryScore
 from stsem.report.outline import Block, Code, Column, Folded, Items, Row, Section, Table, Text
-from stsem.report.wording import NONE, count, meaning, number
+from stsem.report.wording import NONE, NOT_MEASURED, count, meaning, number, percent
 
 
 def input_section(document: Document) -> Section:
@@ -61,33 +61,47 @@ def _scores(document: Document, name: str, part: type[Part]) -> Table | None:
     if not runs:
         return None
     columns = (Column(name, number=False), *(Column(run.mode) for run in runs))
-    fields = [
-        field for field in part.model_fields if any(getattr(getattr(run, name), field) is not None for run in runs)
-    ]
+    parts = [getattr(run, name) for run in runs]
+    fields = [field for field in part.model_fields if any(getattr(run_part, field) for run_part in parts)]
     rows = tuple(
         Row(
-            (field.replace("_", " "), *(_plain(getattr(getattr(run, name), field)) for run in runs)),
-            meaning(part, field),
+            (_titled(field), *(_plain(field, getattr(getattr(run, name), field)) for run in runs)), meaning(part, field)
         )
         for field in fields
     )
-    return Table(columns, rows, ("Fractions are given as 0 to 1, lengths in metres.",))
+    return Table(columns, rows)
 
 
-def _plain(value: object) -> str:
+_IN_PER_CENT = ("share", "miou_3d", "observed", "accuracy_3d", "f_score")
+_UNITS = {"_m": ", m", "_deg": ", deg"}
+
+
+def _titled(field: str) -> str:
+    if field.endswith(_IN_PER_CENT):
+        return f"{field.replace('_', ' ')}, %"
+    ending = next((ending for ending in _UNITS if field.endswith(ending)), "")
+    return field.removesuffix(ending).replace("_", " ") + _UNITS.get(ending, "")
+
+
+def _plain(field: str, value: object) -> str:
     if isinstance(value, float):
-        return f"{value:.3f}"
-    return count(value) if isinstance(value, int) else NONE if value is None else str(value)
+        return percent(value) if field.endswith(_IN_PER_CENT) else f"{value:.3f}"
+    return count(value) if isinstance(value, int) else NOT_MEASURED if value is None else str(value)
 
 
 def unmeasured_section(document: Document) -> Section | None:
     """Everything that was not measured, and why."""
-    said: dict[str, list[str]] = {}
+    modes: dict[tuple[str, str], list[str]] = {}
     for run in document.runs:
         for part, why in run.not_measured.items():
-            said.setdefault(f"{part.replace('_', ' ').replace('.', ': ')}: {why}", []).append(run.mode)
-    every = len(document.runs)
-    items = tuple(text if len(modes) == every else f"{text} ({', '.join(modes)})" for text, modes in said.items())
+            modes.setdefault((part.replace("_", " ").replace(".", ": "), why), []).append(run.mode)
+    parts: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    for (part, why), named in modes.items():
+        parts.setdefault((why, tuple(named)), []).append(part)
+    items = tuple(
+        f"{', '.join(names)}: {why}" + (f" ({', '.join(named)})" if len(named) < len(document.runs) else "")
+        for (why, named), names in parts.items()
+    )
     return Section("Not measured", (Items(items),)) if items else None
 
 
