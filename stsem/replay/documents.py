@@ -6,12 +6,13 @@ import platform
 from stsem import __version__
 from stsem.document.canonical import sealed
 from stsem.document.origin import Channel, Host, Identity, Input, LogInput
-from stsem.document.schema import Document, State, Verdict
+from stsem.document.schema import Document, Run, State, Verdict
 from stsem.errors import EXIT_FINE, EXIT_LOSSY, EXIT_NOTHING_MEASURED
 from stsem.inference.cpu import cpu_features
 from stsem.log.log import Log
 from stsem.replay.comparison import Contender, compare
-from stsem.replay.runs import Context, Found, part, scored
+from stsem.replay.engine import Replayed
+from stsem.replay.runs import Context, Found, part, scored, without_scores
 
 _PACKAGES = ("mcap", "numpy", "onnxruntime", "opencv-python-headless", "scipy")
 
@@ -24,12 +25,13 @@ def build_document(context: Context, host: Host) -> Document:
         host: what differs from run to run.
     """
     found = [scored(run) for run in context.replayed.runs]
+    if not _anything_answered(context.replayed):
+        found = [without_scores(f, "no frame was answered") for f in found]
     base = next((f for f in found if f.run.mode.segments_every_frame), None)
     measured, reason = _accuracy_state(context, found)
     state, reasons = _state(context, measured)
     parts = tuple(part(context, f, base) for f in found)
-    contenders = [Contender(p, f.run.real_time, f.run.offline) for p, f in zip(parts, found, strict=True)]
-    comparisons = compare(contenders, context.config.seed)
+    comparisons = compare([_contender(p, f) for p, f in zip(parts, found, strict=True)], context.config.seed)
     return sealed(
         Document(
             state=state,
@@ -47,6 +49,18 @@ def build_document(context: Context, host: Host) -> Document:
             host=host,
         )
     )
+
+
+def _contender(part: Run, found: Found) -> Contender:
+    """The frames of a pass are compared only if its score stands."""
+    clocked, offline = (accuracy is not None and accuracy.measured for accuracy in (found.clocked, found.offline))
+    return Contender(part, found.run.real_time if clocked else None, found.run.offline if offline else None)
+
+
+def _anything_answered(replayed: Replayed) -> bool:
+    """Whether any pass of any mode answered a frame; streaming would score even a run that never answers, with 0."""
+    records = (record for run in replayed.runs for record in (run.real_time, run.offline) if record is not None)
+    return any(result.outcome.is_answer for record in records for result in record.results)
 
 
 def _accuracy_state(context: Context, found: list[Found]) -> tuple[bool, str]:

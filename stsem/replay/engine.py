@@ -112,7 +112,8 @@ def replay_log(
 def can_map(log: Log, config: RunConfig) -> bool:
     """Whether a map is wanted, and the log has what it needs."""
     choice = log.info.choice
-    return config.map and choice.depth is not None and choice.pose is not None and log.camera is not None
+    straight = log.camera is not None and not log.camera.is_distorted
+    return config.map and choice.depth is not None and choice.pose is not None and straight
 
 
 def _lane(

@@ -55,6 +55,15 @@ def scored(run: ModeRun) -> Found:
     return Found(run, of(run.offline), of(run.real_time))
 
 
+def without_scores(found: Found, reason: str) -> Found:
+    """The same mode, but accuracy was not measured, and why."""
+
+    def emptied(accuracy: Accuracy | None) -> Accuracy | None:
+        return None if accuracy is None else Accuracy(None, None, None, {}, (), None, (), accuracy.reason or reason)
+
+    return Found(found.run, emptied(found.offline), emptied(found.clocked))
+
+
 def part(context: Context, found: Found, base: Found | None) -> Run:
     """One mode's part of the report.
 
@@ -204,7 +213,11 @@ def _why_not(context: Context, found: Found) -> dict[str, str]:
     elif context.sustainable_hz.get(found.run.mode.name) is None:
         why["throughput.sustainable_hz"] = "at 1/64 of the speed frames drop, or p95 from arrival exceeds the deadline"
     if found.run.cloud is None:
-        why["map"] = "--map off" if not config.map else "the log lacks depth, poses or camera intrinsics"
+        why["map"] = (
+            "--map off"
+            if not config.map
+            else "the log lacks depth, poses, or intrinsics of a camera without distortion"
+        )
     if context.log.trajectory is None:
         why["trajectory"] = "the log has no poses"
     else:
