@@ -62,8 +62,27 @@ def header_stamp(payload: memoryview) -> int | None:
     return Cursor(payload).stamp()
 
 
-def image(_: Schema) -> Callable[[memoryview], RawImage]:
+IMAGE_FIELDS = ("header", "height", "width", "encoding", "is_bigendian", "step", "data")
+COMPRESSED_IMAGE_FIELDS = ("header", "format", "data")
+
+
+def check_fields(schema: Schema, expected: tuple[str, ...]) -> None:
+    """ValueError unless the message that `schema` (ros2msg) describes has just these fields; an empty one is trusted.
+
+    The cursor reads a fixed layout, so a namesake with other fields must not reach it.
+    """
+    if schema.encoding != "ros2msg" or not schema.data:
+        return
+    own = schema.data.decode().split("\n====")[0]
+    lines = [line.split("#")[0].split() for line in own.splitlines() if "=" not in line.split("#")[0]]
+    found = tuple(words[1] for words in lines if len(words) > 1)
+    if found != expected:
+        raise ValueError(f"its fields are {', '.join(found) or 'none'}, but {', '.join(expected)} were expected")
+
+
+def image(schema: Schema) -> Callable[[memoryview], RawImage]:
     """Reader of sensor_msgs/Image."""
+    check_fields(schema, IMAGE_FIELDS)
 
     def read(payload: memoryview) -> RawImage:
         cursor = Cursor(payload)
@@ -75,8 +94,9 @@ def image(_: Schema) -> Callable[[memoryview], RawImage]:
     return read
 
 
-def compressed_image(_: Schema) -> Callable[[memoryview], CompressedImage]:
+def compressed_image(schema: Schema) -> Callable[[memoryview], CompressedImage]:
     """Reader of sensor_msgs/CompressedImage."""
+    check_fields(schema, COMPRESSED_IMAGE_FIELDS)
 
     def read(payload: memoryview) -> CompressedImage:
         cursor = Cursor(payload)

@@ -110,6 +110,15 @@ def test_tf_and_poses_and_label_info() -> None:
     assert table == ClassNames(BASE_NS, names)
 
 
+def test_a_namesake_with_other_fields_is_not_read() -> None:
+    text = b"# comment\nint32 K=5\nstd_msgs/Header header # when\nstring format\n\nuint8[] data\n====\nMSG: a/B\n"
+    name = "sensor_msgs/msg/CompressedImage"
+    assert callable(ros2.compressed_image(Schema(id=1, name=name, encoding="ros2msg", data=text)))
+    other = text.replace(b"string format", b"uint8 quality\nstring format")
+    with pytest.raises(ValueError, match="its fields are header, quality, format, data, but header, format, data were"):
+        ros2.compressed_image(Schema(id=1, name=name, encoding="ros2msg", data=other))
+
+
 def test_a_schema_language_that_cannot_be_read_is_said() -> None:
     schema = Schema(id=1, name="tf2_msgs/msg/TFMessage", encoding="ros2idl", data=b"module tf2_msgs {}")
     with pytest.raises(ValueError, match="'ros2idl' cannot be read"):
