@@ -1,0 +1,149 @@
+"""Our own logs: the foxglove schemas, depth and labels as raw images in zstd chunks (DESIGN 10)."""
+
+import json
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Protocol, Self
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from foxglove import messages as fox
+from mcap.well_known import MessageEncoding
+from mcap.writer import CompressionType, Writer
+
+from stsem import __version__
+from stsem.camera import Camera
+from stsem.classes import NO_LABEL, ClassSet, Labels
+from stsem.errors import OutputError
+from stsem.frame import Image
+from stsem.pose import Pose, to_quaternion
+
+WORLD, OPTICAL = "world", "camera_optical"
+_CHUNK_BYTES = 2 << 20
+_JPEG_QUALITY = 85
+_SECOND_NS = 10**9
+
+
+class _Encodable(Protocol):
+    def encode(self) -> bytes: ...
+
+
+_SCHEMAS: dict[str, Any] = {
+    "/camera/color": fox.CompressedImage,
+    "/camera/depth": fox.RawImage,
+    "/gt/labels": fox.RawImage,
+    "/camera/calibration": fox.CameraCalibration,
+    "/pose": fox.PoseInFrame,
+}
+
+
+class LogWriter:
+    """Writes a log beside `path` and renames it when it is complete.
+
+    Messages must come in ascending order of log time; equal input gives equal bytes. With an exception inside the
+    `with` block nothing is left behind.
+
+    Args:
+        path: the file.
+        classes: names and colours; they go into the metadata record `stsem.classes` and the attachment `classes.json`.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+
+    def __init__(self, path: Path, classes: ClassSet) -> None:
+        self._path, self._aside, self._classes = path, path.with_name(f".{path.name}.{os.getpid()}"), classes
+        self._stream: IO[bytes] = self._open()
+        self._writer = Writer(
+            self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
+        )
+        self._writer.start("", f"stsem {__version__}")
+        names = {str(i): name for i, name in enumerate(classes.names)}
+        self._writer.add_metadata("stsem.classes", names)
+        self._channels = {topic: self._register(topic, schema) for topic, schema in _SCHEMAS.items()}
+        self._counts = dict.fromkeys(_SCHEMAS, 0)
+        self._last_ns = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if kind is not None:
+            self._stream.close()
+            self._aside.unlink(missing_ok=True)
+            return
+        self._writer.add_attachment(0, self._last_ns, "classes.json", "application/json", self._class_table())
+        self._writer.finish()
+        self._stream.close()
+        self._aside.replace(self._path)
+
+    def color(self, stamp_ns: int, log_ns: int, image: Image) -> None:
+        """A colour image (H, W, 3) uint8 RGB, as JPEG."""
+        settings = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
+        _, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), settings)
+        message = fox.CompressedImage(
+            timestamp=_stamp(stamp_ns), frame_id=OPTICAL, format="jpeg", data=data.tobytes()
+        )  # fmt: skip
+        self._write("/camera/color", stamp_ns, log_ns, message)
+
+    def depth(self, stamp_ns: int, log_ns: int, millimetres: npt.NDArray[np.uint16]) -> None:
+        """Depth (H, W) uint16 along z, 0 unknown, pixel for pixel that of the colour image."""
+        self._write("/camera/depth", stamp_ns, log_ns, _raw(stamp_ns, "16UC1", millimetres.astype("<u2")))
+
+    def labels(self, stamp_ns: int, log_ns: int, labels: Labels) -> None:
+        """Truth (H, W) uint8 class ids, 255 ignored."""
+        self._write("/gt/labels", stamp_ns, log_ns, _raw(stamp_ns, "mono8", labels))
+
+    def calibration(self, stamp_ns: int, log_ns: int, camera: Camera) -> None:
+        """Intrinsics of the colour and the depth image."""
+        K = camera.K.ravel().tolist()
+        message = fox.CameraCalibration(
+            timestamp=_stamp(stamp_ns), frame_id=OPTICAL, width=camera.width, height=camera.height,
+            distortion_model="plumb_bob", D=[0.0] * 5, K=K, R=np.eye(3).ravel().tolist(),
+            P=np.hstack([camera.K, np.zeros((3, 1))]).ravel().tolist(),
+        )  # fmt: skip
+        self._write("/camera/calibration", stamp_ns, log_ns, message)
+
+    def pose(self, stamp_ns: int, log_ns: int, T_WC: Pose) -> None:
+        """Pose of the optical frame in the world, metres."""
+        x, y, z = T_WC[:3, 3].tolist()
+        qx, qy, qz, qw = to_quaternion(T_WC).tolist()
+        pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=z), orientation=fox.Quaternion(x=qx, y=qy, z=qz, w=qw))
+        self._write("/pose", stamp_ns, log_ns, fox.PoseInFrame(timestamp=_stamp(stamp_ns), frame_id=WORLD, pose=pose))
+
+    def _open(self) -> IO[bytes]:
+        try:
+            return self._aside.open("wb")
+        except OSError as err:
+            raise OutputError(f"The log {self._path} cannot be written: {err.strerror}; choose another place.") from err
+
+    def _register(self, topic: str, schema: Any) -> int:
+        described = schema.get_schema()
+        schema_id = self._writer.register_schema(described.name, described.encoding, described.data)
+        return self._writer.register_channel(topic, MessageEncoding.Protobuf, schema_id)
+
+    def _write(self, topic: str, stamp_ns: int, log_ns: int, message: _Encodable) -> None:
+        if log_ns < self._last_ns:
+            raise ValueError(f"{topic} at {log_ns} ns came after a message at {self._last_ns} ns")
+        self._writer.add_message(self._channels[topic], log_ns, message.encode(), stamp_ns, self._counts[topic])
+        self._counts[topic] += 1
+        self._last_ns = log_ns
+
+    def _class_table(self) -> bytes:
+        colours = self._classes.palette()[: len(self._classes)].tolist()
+        table = {"names": list(self._classes.names), "colours": colours, "ignore_id": NO_LABEL}
+        return (json.dumps(table, indent=1) + "\n").encode()
+
+
+def _stamp(stamp_ns: int) -> fox.Timestamp:
+    return fox.Timestamp(*divmod(stamp_ns, _SECOND_NS))
+
+
+def _raw(stamp_ns: int, encoding: str, pixels: npt.NDArray[Any]) -> fox.RawImage:
+    height, width = pixels.shape
+    return fox.RawImage(
+        timestamp=_stamp(stamp_ns), frame_id=OPTICAL, width=width, height=height, encoding=encoding,
+        step=width * pixels.itemsize, data=pixels.tobytes(),
+    )  # fmt: skip
