@@ -1,6 +1,7 @@
 """Markdown and HTML: one outline, every number with its basis, nothing blank."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
@@ -8,13 +9,18 @@ from pathlib import Path
 import pytest
 from made_up_run import example
 
-from stsem.document.schema import MapScore, TrajectoryScore
+from stsem.document.accuracy import Score
+from stsem.document.schema import MapScore, Run, TrajectoryScore
+from stsem.document.timing import Latency, Outcomes, Throughput
 from stsem.report.contents import outline
+from stsem.report.frames_csv import frames_csv
 from stsem.report.html import html
-from stsem.report.inputs import ReportInputs
+from stsem.report.inputs import FrameRow, ReportInputs
 from stsem.report.markdown import markdown
 from stsem.report.outline import Section, Table
 from stsem.report.plots.gallery import Picture, draw_all
+from stsem.report.terminal import closing_table
+from stsem.result import FrameResult, Outcome
 
 VARIANTS = {"full": {}, "no truth": {"truth": False}, "lossy": {"lossy": True}, "offline": {"clock": False}}
 
@@ -156,6 +162,57 @@ def test_text_from_the_log_cannot_break_the_page() -> None:
     report = outline(document, frozenset())
     assert check(html(report, {})).tags.isdisjoint({"script"})
     assert "\\|x" in markdown(report)
+
+
+def test_odd_names_of_classes_are_drawn_as_they_are() -> None:
+    """No mathematics in `$x$`, and no warning for a script that the font lacks."""
+    inputs = example(pictures=False)
+    first, second = inputs.document.runs
+    renamed = {"$wall_{x$": 0.5, "床": 0.25, "a & <b>": 0.75}
+    score = Score(miou=0.5, pixel_accuracy=0.5, classes_averaged=3, iou=renamed, n=5)
+    runs = tuple(run.model_copy(update={"offline": score, "streaming": None}) for run in (first, second))
+    names = inputs.document.input.model_copy(update={"classes": tuple(renamed)})
+    document = inputs.document.model_copy(update={"runs": runs, "input": names})
+    pictures = draw_all(replace(inputs, document=document))
+    page = html(outline(document, frozenset(pictures)), pictures)
+    check(page)
+    assert "$wall_{x$" in page
+
+
+def test_nothing_measured_is_a_report_too() -> None:
+    inputs = example(pictures=False)
+    document = inputs.document.model_copy(
+        update={"state": "invalid", "accuracy_state": "not measured", "accuracy_reason": "no frame could be decoded",
+                "state_reasons": ("No frame could be decoded.",), "runs": (), "comparison": None}
+    )  # fmt: skip
+    empty = ReportInputs(document)
+    assert draw_all(empty) == {}
+    report = outline(document, frozenset())
+    assert "**INVALID**" in markdown(report)
+    assert check(html(report, {})).tags
+    assert "Accuracy was not measured: no frame could be decoded." in closing_table(document)
+    assert frames_csv(empty).count(b"\n") == 1
+
+
+def test_a_run_without_any_answer_is_a_report_too() -> None:
+    """Everything undecodable: no latency, no distance, no picture of what is not there."""
+    inputs = example(pictures=False)
+    first = inputs.document.runs[0]
+    coverage = first.coverage.model_copy(update={"scored": 0})
+    bare = Run(mode="per-frame", clock="real-time", frames=150, outcomes=Outcomes(undecodable=150), coverage=coverage,
+               latency_ms=Latency(), throughput=Throughput())  # fmt: skip
+    results = [FrameResult(i, i, None, None, None, Outcome.UNDECODABLE) for i in range(150)]
+    rows = tuple(FrameRow("per-frame", result, result.index) for result in results)
+    document = inputs.document.model_copy(
+        update={"runs": (bare,), "comparison": None, "accuracy_state": "not measured"}
+    )
+    nothing = ReportInputs(document, rows)
+    assert draw_all(nothing) == {}
+    report = outline(document, frozenset())
+    check(html(report, {}))
+    assert "0 of 150 frames answered" in markdown(report)
+    assert "nan" not in closing_table(document)
+    assert frames_csv(nothing).count(b"undecodable") == 150
 
 
 def test_a_single_mode_is_reported_without_comparison() -> None:

@@ -2,6 +2,7 @@
 
 import io
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -30,6 +31,7 @@ _RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "text.color": INK,
+    "text.parse_math": False,
     "axes.labelcolor": INK,
     "axes.edgecolor": GRID,
     "axes.linewidth": 0.8,
@@ -67,7 +69,8 @@ def mode_colour(mode: str, position: int = 0) -> str:
 @contextmanager
 def look() -> Iterator[None]:
     """The common look: figures are made, drawn and saved inside it; whatever was set before comes back behind it."""
-    with mpl.rc_context(_RC):
+    with mpl.rc_context(_RC), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # names in scripts that DejaVu lacks
         yield
 
 
