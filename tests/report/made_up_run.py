@@ -1,30 +1,27 @@
 """A made-up run that looks like a real one: 150 frames of an office at 10 Hz, two modes, a two-core schedule."""
 
-from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
+from made_up_origin import host, identity, made_up_input
 from made_up_pictures import CLASSES, strip_frame
+from made_up_schedule import COST_MS, FIRST_NS, FRAMES, MODES, PERIOD_NS, offline, schedule
 
 from stsem.chance import generator
 from stsem.classes import ClassSet
 from stsem.document.accuracy import Coverage, DistanceRow, DistanceSummary, Loss, LossParts, Score
 from stsem.document.canonical import sealed
-from stsem.document.origin import Channel, Host, Identity, Input, LogInput, StageCost
 from stsem.document.schema import Comparison, ComparisonRow, Document, Run, Verdict
 from stsem.document.timing import PERCENTILES, Distribution, Latency, Outcomes, StageLatency, Throughput
 from stsem.report.inputs import FrameRow, ReportInputs
-from stsem.result import FrameResult, Outcome, Span
+from stsem.result import FrameResult, Outcome
 
 SHARES = (0, 1, 12, 6, 19, 9, 4, 2, 0, 7, 3, 31, 6)
-FRAMES, PERIOD_NS, FIRST_NS = 150, 100_000_000, 1_700_000_000_000_000_123
-MODES = ("per-frame", "keyframe")
-COST_MS = {"register": (8.0, 11.0), "segment": (150.0, 195.0), "propagate": (4.5, 7.0), "fuse": (14.0, 22.0)}
 
 
 def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pictures: bool = True) -> ReportInputs:
     """Inputs of a report; without truth, from a damaged log, or without a clock."""
-    simulated = {mode: _schedule(mode, lossy) if clock else _offline(_schedule(mode, lossy)) for mode in MODES}
+    simulated = {mode: schedule(mode, lossy) if clock else offline(schedule(mode, lossy)) for mode in MODES}
     rows = tuple(_with_accuracy(mode, result, truth) for mode in MODES for result in simulated[mode])
     runs = tuple(_run(mode, [row for row in rows if row.mode == mode], truth, clock) for mode in MODES)
     document = Document(
@@ -35,8 +32,8 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
         verdict=Verdict(
             exit_code=3 if lossy else 0, text="Finished, but the log is damaged." if lossy else "Finished."
         ),
-        identity=_identity(),
-        input=_input(truth, lossy),
+        identity=identity(),
+        input=made_up_input(truth, lossy),
         config={
             "mode": list(MODES),
             "model": "psp18",
@@ -53,7 +50,7 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
         runs=runs,
         comparison=_comparison(runs, truth, clock),
         warnings=("The labels carry log times only; they are taken as stamps.",),
-        host=_host(),
+        host=host(),
     )
     strip = tuple(strip_frame(i, truth) for i in (12, 47, 90, 131)) if pictures else ()
     trace = b'{"traceEvents":[]}\n' if clock else None
@@ -65,57 +62,6 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
         trajectory=b"# stamp x y z qx qy qz qw\n",
         answer_classes=ClassSet(CLASSES),
     )
-
-
-@dataclass
-class _Cores:
-    """The two-core schedule of the example, job after job."""
-
-    mode: str
-    free_ns: int = 0
-
-    def job(self, frame: int, stage: str, ready: int, cores: tuple[int, ...]) -> Span:
-        low, high = COST_MS[stage]
-        start = max(ready, self.free_ns if len(cores) == 2 else ready)
-        cost = int(1e6 * generator(0, stage, frame).uniform(low, high))
-        self.free_ns = start + cost
-        return Span(frame, stage, cores, ready, start, start + cost)
-
-
-def _schedule(mode: str, lossy: bool) -> list[FrameResult]:
-    cores, results, busy_until, keyframe = _Cores(mode), [], 0, None
-    for i in range(FRAMES):
-        stamp = i * PERIOD_NS
-        arrival = stamp + 12_000_000 + int(generator(1, i).uniform(0, 4e6))
-        if lossy and i in (40, 41):
-            results.append(FrameResult(i, stamp, None, None, None, Outcome.UNDECODABLE, reason="bad CRC"))
-            continue
-        if busy_until > arrival + PERIOD_NS:
-            results.append(FrameResult(i, stamp, arrival, None, None, Outcome.DROPPED_BUSY, reason="newer frame came"))
-            continue
-        taken, spans = max(arrival, busy_until), []
-        segment = mode == "per-frame" or keyframe is None or i - keyframe >= 5 + int(generator(2, i).integers(0, 4))
-        if mode == "keyframe":
-            spans.append(cores.job(i, "register", taken, (0,)))
-        stage, which = ("segment", (0, 1)) if segment else ("propagate", (0,))
-        spans.append(cores.job(i, stage, spans[-1].end_ns if spans else taken, which))
-        busy_until = answered = spans[-1].end_ns
-        if segment:
-            keyframe = i
-            if mode == "keyframe":
-                spans.append(replace(cores.job(i, "fuse", answered, (1,)), cores=(1,)))
-        reason = ("first" if i == 0 else "every frame" if mode == "per-frame" else "rotation") if segment else ""
-        outcome = Outcome.SEGMENTED if segment else Outcome.PROPAGATED
-        results.append(FrameResult(i, stamp, arrival, taken, answered, outcome, keyframe, reason, 0.97, tuple(spans)))
-    return results
-
-
-def _offline(results: list[FrameResult]) -> list[FrameResult]:
-    return [
-        replace(r, arrival_ns=None, taken_ns=None, answered_ns=None, spans=(), outcome=Outcome.PROPAGATED
-                if r.outcome is Outcome.DROPPED_BUSY else r.outcome, keyframe=r.keyframe or 0)
-        for r in results
-    ]  # fmt: skip
 
 
 def _with_accuracy(mode: str, result: FrameResult, truth: bool) -> FrameRow:
@@ -332,55 +278,3 @@ def _comparison(runs: tuple[Run, ...], truth: bool, clock: bool) -> Comparison:
             )
         )
     return Comparison(base=base.mode, other=other.mode, rows=tuple(rows))
-
-
-def _identity() -> Identity:
-    return Identity(
-        backend="onnxruntime",
-        precision="f32",
-        versions={"stsem": "0.1.0", "onnxruntime": "1.30.0", "python": "3.11.2"},
-        cpu_features=("avx2", "fma"),
-        model="psp18",
-        model_sha256="ab" * 32,
-        sidecar_sha256="cd" * 32,
-        costs="reference.json",
-        costs_sha256="ef" * 32,
-        costs_disturbed=True,
-    )
-
-
-def _input(truth: bool, lossy: bool) -> Input:
-    channels = {
-        "color": Channel(topic="/camera/color", messages=FRAMES, schema_name="foxglove.RawImage", offset_ms=12.1),
-        "pose": Channel(topic="/tf", messages=600, schema_name="foxglove.FrameTransforms", offset_ms=0.4),
-        "labels": Channel(topic="/labels", messages=FRAMES, schema_name="foxglove.RawImage", offset_ms=12.1),
-    }
-    if not truth:
-        del channels["labels"]
-    log = LogInput(
-        name="office.mcap",
-        sha256="12" * 32,
-        frames=FRAMES,
-        frames_with_truth=FRAMES * truth,
-        duration_s=14.9,
-        period_ms=100.0,
-        size=(480, 270),
-        truth_size=(480, 270) if truth else None,
-        channels=channels,
-        damage={"crc_failures": 2, "truncated_chunks": 1} if lossy else {},
-    )
-    return Input(logs=(log,), classes=CLASSES if truth else (), classes_unknown_to_network=("books",) if truth else ())
-
-
-def _host() -> Host:
-    return Host(
-        paths={"log": "logs/office.mcap"},
-        command="stsem-replay logs/office.mcap --costs bench/costs/reference.json",
-        machine={"processor": "some CPU", "cores": "2", "memory": "8 GiB"},
-        started_at="2026-01-02T03:04:05+00:00",
-        wall_s=41.2,
-        cpu_s=70.9,
-        stages={"segment": StageCost(mean_ms=171.0, max_ms=196.0, n=150)},
-        overhead_ms=4.1,
-        peak_memory_bytes=512 << 20,
-    )
