@@ -104,8 +104,8 @@ def _sustainable(session: Session) -> dict[str, float | None]:
     if costs.sha256 is None:
         raise UsageError("--sustainable needs durations that repeat; give --costs auto or a file instead of measured.")
     usable = truth_frames(log) if config.is_oracle else None
-    probe = Probe(log, config, costs.of, fused=session.fused, usable=usable)
     deadline = deadline_ns(config.deadline_ms, log.period_ns, Fraction(1))
+    probe = Probe(log, config, costs.of, fused=session.fused, usable=usable, patience_ns=deadline)
     return {
         mode.name: search(partial(probe.attempt, mode), capture_hz=1e9 / log.period_ns, deadline_ns=deadline).hz
         for mode in config.modes

@@ -96,12 +96,21 @@ class Probe:
         costs_of: cost source of a mode.
         fused: whether a map stands beside the path.
         usable: log indices that can be segmented (the oracle needs truth); None for all.
+        patience_ns: how long the clock runs on after the last arrival, at least: with 0 as long as in the real run.
     """
 
     def __init__(
-        self, log: Log, config: RunConfig, costs_of: CostsOf, *, fused: bool, usable: frozenset[int] | None
+        self,
+        log: Log,
+        config: RunConfig,
+        costs_of: CostsOf,
+        *,
+        fused: bool,
+        usable: frozenset[int] | None,
+        patience_ns: int = 0,
     ) -> None:
         self._log, self._config, self._costs_of, self._usable = log, config, costs_of, usable
+        self._patience_ns = patience_ns
         self._roles = frozenset({"depth", "pose"}) if fused else frozenset()
         self._policy = parse_policy(
             config.keyframes,
@@ -134,7 +143,7 @@ class Probe:
         run = RealTimeRun(slots, AnswerRule(labels, prediction), machine, results)
         for loaded in self._frames:
             run.push(loaded)
-        run.finish(horizon_ns(slots, self._log.period_ns, rate))
+        run.finish(max(horizon_ns(slots, self._log.period_ns, rate), horizon_ns(slots, self._patience_ns, Fraction(1))))
         return results.ended_frames
 
     def _decoded(self, looks: bool) -> tuple[list[Loaded], dict[int, Features]]:
