@@ -83,7 +83,9 @@ def numbered_truth(slot: Slot) -> Labels:
 class Bench:
     """Runs one mode over made-up frames and keeps everything."""
 
-    def __init__(self, slots: tuple[Slot, ...], *, keyframes: int | None, register: bool, queue: str, costs: dict) -> None:
+    def __init__(
+        self, slots: tuple[Slot, ...], *, keyframes: int | None, register: bool, queue: str, costs: dict
+    ) -> None:
         prediction = None
         if keyframes is not None:
             prediction = Prediction(EveryPolicy(keyframes), CopyKeyframe(), NoFeatures() if register else None)
