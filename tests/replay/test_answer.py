@@ -1,6 +1,7 @@
 """The order of the stages, and the keyframes they remember, without a clock."""
 
 from collections.abc import Callable
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,11 +14,12 @@ from stsem.metrics.scorecard import Scorecard
 from stsem.replay.answer import EVERY_FRAME, FIRST, AnswerRule, Prediction
 from stsem.replay.offline import OfflineRun
 from stsem.replay.record import Record
+from stsem.replay.schedule import schedule
 from stsem.result import Outcome
 from stsem.stages.register import Registration
 from stsem.stages.select import EveryPolicy, PaperPolicy
 
-from .conftest import PERIOD_NS, CopyKeyframe, NumberSegmenter, loaded, make_slots, numbered_truth
+from .conftest import PERIOD_NS, CopyKeyframe, NumberSegmenter, loaded, make_plans, make_slots, numbered_truth
 
 
 class Partial(NumberSegmenter):
@@ -172,16 +174,9 @@ def test_nothing_to_predict_from() -> None:
 
 def test_only_truth() -> None:
     """The offline pass of `per-frame` leaves out what nobody can judge; the frames it computes are the same."""
-    slots = tuple(make_slots(6))
-    partly = tuple(
-        type(slot)(
-            *(getattr(slot, n) for n in ("index", "log_stamp_ns", "stamp_ns", "arrival_ns", "missing")),
-            slot.index % 2 == 0,
-        )
-        for slot in slots
-    )
-    record = Record(partly, None, frozenset())
-    run = OfflineRun(partly, AnswerRule(NumberSegmenter(), None), record, fuse=None, only_truth=True)
-    for slot in partly:
+    slots = schedule(make_plans(6, truth=lambda i: i % 2 == 0), Fraction(1), frozenset(), frozenset())
+    record = Record(slots, None, frozenset())
+    run = OfflineRun(slots, AnswerRule(NumberSegmenter(), None), record, fuse=None, only_truth=True)
+    for slot in slots:
         run.push(loaded(slot))
     assert [r.index for r in record.results] == [0, 2, 4]

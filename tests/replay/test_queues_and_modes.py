@@ -27,9 +27,9 @@ def test_nothing_is_lost(rule: str, puts: list[bool]) -> None:
             dropped = box.put(came)
             model.append(came)
             if dropped is not None:
+                assert dropped == (model[0] if newest_wins else came)
                 model.remove(dropped)
                 gone.append(dropped)
-                assert dropped == (came - 0 if not newest_wins else dropped)
             came += 1
         else:
             taken = box.take()

@@ -1,6 +1,7 @@
 """The state machine on the simulated clock, against schedules worked out by hand."""
 
 from collections import Counter
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from .conftest import MS, Bench, make_slots
 
 
 def test_ten_frames_by_hand(bench: type[Bench]) -> None:
-    """Frame i arrives at 100 i + 10 ms. Register 30, segment 250 on both cores, propagate 20; a keyframe every 4 frames.
+    """Frame i arrives at 100 i + 10 ms. Register 30, segment 250 on both cores, propagate 20; a keyframe every 4.
 
     Frame 0 is registered 10-40 and segmented 40-290; meanwhile 1 (110) is replaced by 2 (210). Frame 2 is registered
     290-320 and propagated 320-340; frame 3 (310) waited, 340-370-390. Frame 4 (410): 4 - 0 >= 4, a keyframe, 440-690;
@@ -99,7 +100,8 @@ def test_undecodable_frames_never_reach_the_queue(bench: type[Bench]) -> None:
     assert [str(r.outcome) for r in played.record.results] == ["segmented", "undecodable", "segmented", "segmented"]
     assert played.record.scorecard is not None
     streaming = played.record.scorecard.compute().streaming
-    assert streaming is not None and streaming.frames == 4
+    assert streaming is not None
+    assert streaming.frames == 4
 
 
 @settings(max_examples=60, deadline=None)
@@ -112,7 +114,7 @@ def test_undecodable_frames_never_reach_the_queue(bench: type[Bench]) -> None:
 def test_every_frame_ends_once(
     count: int, keyframes: int | None, register: bool, queue: str, costs: dict[str, int], broken: frozenset[int]
 ) -> None:
-    """Whatever the costs and the queue: one outcome per frame, answers after arrivals, one frame at a time on the path."""
+    """Whatever the costs and the queue: one outcome per frame, answers after arrivals, one frame at a time."""
     prices: dict[str, Any] = {name: cost * MS for name, cost in costs.items()}
     played = Bench(make_slots(count), keyframes=keyframes, register=register, queue=queue, costs=prices).play(broken)
     results = played.record.results
@@ -121,4 +123,4 @@ def test_every_frame_ends_once(
     answered = [r for r in results if r.answered_ns is not None]
     assert all(r.arrival_ns <= r.taken_ns <= r.answered_ns for r in answered)  # type: ignore[operator]
     taken = sorted((r.taken_ns, r.answered_ns) for r in answered)
-    assert all(later[0] >= earlier[1] for earlier, later in zip(taken, taken[1:], strict=False))  # type: ignore[operator]
+    assert all(later[0] >= earlier[1] for earlier, later in pairwise(taken))  # type: ignore[operator]
