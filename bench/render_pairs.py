@@ -15,35 +15,17 @@ from stsem import chance
 from stsem.camera import Camera
 from stsem.pose import Pose
 from stsem.synth.generate import office_camera
-from stsem.synth.lighting import illuminate
-from stsem.synth.office import Office, build_office
+from stsem.synth.office import Office
 from stsem.synth.path import pose_at, profile, walk
+from stsem.synth.scene import Scene
 from stsem.synth.sensor import expose
-from stsem.synth.tracer import Tracer
-from stsem.synth.view import View, lit_body, look
-from stsem.synth.walkers import walker
+from stsem.synth.view import View
 from stsem.train.dataset import Pair, save_pair
 
 WIDTH, HEIGHT = 480, 270
 WALK_S, PERIOD_S = 60.0, 0.1
 MARGIN_M = 0.25
 ATTEMPTS = 6
-
-
-class Scene:
-    """A lit office with its walkers, ready to be photographed."""
-
-    def __init__(self, layout: int) -> None:
-        self.office = build_office(layout)
-        quads, materials = self.office.quads, self.office.materials
-        tracer = Tracer(quads)
-        self._static = lit_body(quads, tracer, illuminate(quads, tracer, self.office.furnishing.lights), materials)
-        self._people = walker(self.office, layout)
-
-    def look(self, camera: Camera, T_WC: Pose, time_s: float) -> View:
-        bodies = [self._static, *(person.at(time_s) for person in self._people)]
-        spots = np.array([person.place(time_s)[:2] for person in self._people], np.float64).reshape(-1, 2)
-        return look(bodies, self.office.materials, camera, T_WC, spots)
 
 
 def walked(layout: int, office: Office, count: int) -> list[tuple[Pose, Pose, float]]:
@@ -102,7 +84,7 @@ def render(layout: int, count: int, folder: Path) -> None:
     """The pairs of one layout; one whose last pair is there already is skipped."""
     if (folder / f"{layout:05}_{count - 1:02}.npz").exists():
         return
-    scene = Scene(layout)
+    scene = Scene(layout, layout)
     tour = walked(layout, scene.office, (count + 1) // 2)
     for k in range(count):
         rng = chance.generator(layout, "pair", k)

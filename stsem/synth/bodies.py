@@ -34,7 +34,7 @@ def tube(
     into: Builder, start: npt.ArrayLike, end: npt.ArrayLike, radii: Range, material: int, label: Label, *,
     sides: int = 10, caps: bool = True, inside: bool = False, flat: float = 1.0,
 ) -> None:  # fmt: skip
-    """A (tapered) cylinder from `start` to `end`; `inside` turns its faces inwards, `flat` squeezes it along one axis."""
+    """A (tapered) cylinder from `start` to `end`; `inside` turns its faces in, `flat` squeezes it along one axis."""
     a, b = np.asarray(start, np.float64), np.asarray(end, np.float64)
     axis = (b - a) / np.linalg.norm(b - a)
     side = np.cross(axis, (0.0, 1.0, 0.0) if abs(axis[1]) < 0.9 else (1.0, 0.0, 0.0))

@@ -118,8 +118,8 @@ def corridor_shell(world: Builder, plan: FloorPlan, palette: Palette) -> None:
     frames = wall_frames(world, plan.length, plan.width)
     north, south = _doorways(plan, 0), _doorways(plan, 1)
     wall(frames["back"][0], plan.length, north, palette.corridor_wall)
-    wall(frames["front"][0], plan.length, tuple((plan.length - b, plan.length - a, *z) for a, b, *z in south),
-         palette.corridor_wall)  # fmt: skip
+    mirrored = tuple((plan.length - x1, plan.length - x0, z0, z1) for x0, x1, z0, z1 in south)
+    wall(frames["front"][0], plan.length, mirrored, palette.corridor_wall)
     x0 = (plan.width - DOOR_WIDTH) / 2
     for name in ("left", "right"):
         frame = frames[name][0]

@@ -37,7 +37,7 @@ class Light:
 
 @dataclass
 class Furnishing:
-    """What has been placed so far: obstacles on the floor, wall stretches in use, targets, lights, spots for persons."""
+    """What has been placed so far: obstacles on the floor, ways to keep clear, targets, lights, spots for persons."""
 
     obstacles: list[Rect] = field(default_factory=list)
     clear: list[Rect] = field(default_factory=list)

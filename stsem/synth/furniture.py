@@ -111,7 +111,8 @@ def painting(into: Builder, palette: Palette, rng: Rng, width: float, height: fl
     rim = 0.045
     box(into, (0, width), (-0.035, 0), (0, height), frame, Label.PAINTING)
     into.quad(
-        [(rim, -0.037, rim), (width - rim, -0.037, rim), (width - rim, -0.037, height - rim), (rim, -0.037, height - rim)],
+        [(rim, -0.037, rim), (width - rim, -0.037, rim), (width - rim, -0.037, height - rim),
+         (rim, -0.037, height - rim)],
         picture, Label.PAINTING, fit=True,
     )  # fmt: skip
 

@@ -1,10 +1,9 @@
 """Rendered logs: an office, a walk through it, a camera's faults, and the file."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from stsem import chance
 from stsem.camera import Camera
@@ -13,14 +12,11 @@ from stsem.errors import UsageError
 from stsem.frame import Depth, Image
 from stsem.log.writer import LogWriter
 from stsem.pose import Pose
-from stsem.synth.lighting import illuminate
-from stsem.synth.office import Office, build_office
 from stsem.synth.path import pose_at, profile, walk
+from stsem.synth.scene import Scene
 from stsem.synth.sensor import check_noise, expose, kinect, millimetres
-from stsem.synth.tracer import Tracer
-from stsem.synth.view import LitBody, lit_body, look
+from stsem.synth.view import View
 from stsem.synth.vocabulary import OFFICE
-from stsem.synth.walkers import Walker, walker
 
 START_NS = 1_700_000_000 * 10**9
 FOCAL_PER_WIDTH = 0.58
@@ -47,28 +43,37 @@ class RenderedFrame:
     T_WC: Pose
 
 
+Message = tuple[int, int, Callable[[LogWriter], None]]
+"""Log time, rank among messages of one time, and what writes it."""
+
+
 def render_frames(
     *, seed: int, layout: int, width: int, height: int, rate_hz: float, length_s: float, noise: str, speed: str
-) -> Iterator[RenderedFrame]:
-    """Frames of a walk; arguments as of `render_log`."""
+) -> Generator[RenderedFrame, None, None]:
+    """Frames of a walk, one in memory at a time; arguments and errors as of `render_log`.
+
+    Values that cannot be are refused at the call, not at the first frame.
+    """
+    _check(width, height, rate_hz, length_s)
     check_noise(noise)
-    office, camera = build_office(layout), office_camera(width, height)
-    states = walk(office, chance.hash31(seed, "walk", layout), length_s, profile(speed))
-    tracer = Tracer(office.quads)
-    static = lit_body(
-        office.quads, tracer, illuminate(office.quads, tracer, office.furnishing.lights), office.materials
-    )
-    people = walker(office, seed)
-    for i in range(max(1, int(length_s * rate_hz))):
-        time_s = i / rate_hz
-        yield _frame(office, camera, static, people, pose_at(states, time_s), i, time_s, seed, noise)
+    moves = profile(speed)
+
+    def frames() -> Generator[RenderedFrame, None, None]:
+        camera, scene = office_camera(width, height), Scene(layout, seed)
+        states = walk(scene.office, chance.hash31(seed, "walk", layout), length_s, moves)
+        for i in range(_count(rate_hz, length_s)):
+            time_s = i / rate_hz
+            T_WC = pose_at(states, time_s)
+            yield _captured(scene.look(camera, T_WC, time_s), camera, T_WC, i, time_s, seed, noise)
+
+    return frames()
 
 
 def render_log(
     path: Path, *, seed: int, layout: int, width: int, height: int, rate_hz: float, length_s: float, noise: str,
     speed: str, label_every: int = 1, progress: Callable[[int, int], None] | None = None,
 ) -> None:  # fmt: skip
-    """Render a log; equal arguments give equal bytes.
+    """Render a log; equal arguments give equal bytes. Whatever goes wrong, no half of a log is left behind.
 
     Args:
         path: the file to write.
@@ -83,25 +88,27 @@ def render_log(
         progress: called with (frames done, frames).
 
     Raises:
-        UsageError: a value that cannot be; MissingExtraError: the extra `synth` is not installed; OutputError.
+        UsageError: a value that cannot be; MissingExtraError: the extra `synth` is not installed; OutputError: the
+        file cannot be written, told before anything is rendered.
     """
-    _check(width, height, rate_hz, length_s, label_every)
-    total, camera = max(1, int(length_s * rate_hz)), office_camera(width, height)
-    frames = render_frames(
+    if label_every < 1:
+        raise UsageError(f"Truth for every {label_every} frames was asked for; give 1 or more.")
+    rendered = render_frames(
         seed=seed, layout=layout, width=width, height=height, rate_hz=rate_hz, length_s=length_s, noise=noise,
         speed=speed,
     )  # fmt: skip
-    pending: list[tuple[int, int, str, int, object]] = []
-    with LogWriter(path, OFFICE) as log:
+    total, camera = _count(rate_hz, length_s), office_camera(width, height)
+    pending: list[Message] = []
+    with closing(rendered) as frames, LogWriter(path, OFFICE) as log:
         for i, frame in enumerate(frames):
             pending += _messages(frame, camera, seed, i, label=i % label_every == 0)
-            pending.sort(key=lambda entry: entry[:2])
+            pending.sort(key=lambda message: message[:2])
             while pending and pending[0][0] <= frame.stamp_ns:
-                _write(log, pending.pop(0))
+                pending.pop(0)[2](log)
             if progress is not None:
                 progress(i + 1, total)
-        for entry in pending:
-            _write(log, entry)
+        for _, _, write in pending:
+            write(log)
 
 
 def office_camera(width: int, height: int) -> Camera:
@@ -110,51 +117,46 @@ def office_camera(width: int, height: int) -> Camera:
     return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
 
-def _frame(
-    office: Office, camera: Camera, static: LitBody, people: list[Walker], T_WC: Pose, index: int, time_s: float,
-    seed: int, noise: str,
-) -> RenderedFrame:  # fmt: skip
-    bodies = [static, *(person.at(time_s) for person in people)]
-    spots = np.array([person.place(time_s)[:2] for person in people], np.float64).reshape(-1, 2)
-    view = look(bodies, office.materials, camera, T_WC, spots)
+def _captured(
+    view: View, camera: Camera, T_WC: Pose, index: int, time_s: float, seed: int, noise: str
+) -> RenderedFrame:
+    """What the camera makes of a view."""
     rng = chance.generator(seed, "sensor", index)
     image = expose(view.radiance, 1.0, rng)
     depth = kinect(view.depth, camera.fx, rng) if noise == "kinect" else view.depth
-    stamp = START_NS + round(time_s * 10**9)
-    return RenderedFrame(stamp, image, depth, view.labels, T_WC)
+    return RenderedFrame(START_NS + round(time_s * 10**9), image, depth, view.labels, T_WC)
 
 
-def _messages(
-    frame: RenderedFrame, camera: Camera, seed: int, index: int, *, label: bool
-) -> list[tuple[int, int, str, int, object]]:
-    """(log time, order, kind, stamp, payload) of one frame's messages."""
-    payloads: dict[str, object] = {
-        "calibration": camera, "pose": frame.T_WC, "color": frame.image, "depth": millimetres(frame.depth),
-    }  # fmt: skip
-    if label:
-        payloads["labels"] = frame.labels
-    found = []
-    for order, (kind, payload) in enumerate(payloads.items()):
+def _messages(frame: RenderedFrame, camera: Camera, seed: int, index: int, *, label: bool) -> list[Message]:
+    """The messages of one frame, each after a delay of its own."""
+    stamp = frame.stamp_ns
+
+    def arrival(kind: str) -> int:
         low, high = _DELAYS_NS[kind]
-        delay = low + chance.choose(seed, high - low, "delay", kind, index)
-        found.append((frame.stamp_ns + delay, order, kind, frame.stamp_ns, payload))
-    return found
+        return stamp + low + chance.choose(seed, high - low, "delay", kind, index)
+
+    at = {kind: arrival(kind) for kind in _DELAYS_NS}
+    depth = millimetres(frame.depth)
+    messages: list[Message] = [
+        (at["calibration"], 0, lambda log: log.calibration(stamp, at["calibration"], camera)),
+        (at["pose"], 1, lambda log: log.pose(stamp, at["pose"], frame.T_WC)),
+        (at["color"], 2, lambda log: log.color(stamp, at["color"], frame.image)),
+        (at["depth"], 3, lambda log: log.depth(stamp, at["depth"], depth)),
+    ]
+    if label:
+        messages.append((at["labels"], 4, lambda log: log.labels(stamp, at["labels"], frame.labels)))
+    return messages
 
 
-def _write(log: LogWriter, entry: tuple[int, int, str, int, object]) -> None:
-    log_ns, _, kind, stamp_ns, payload = entry
-    write = {
-        "calibration": log.calibration, "pose": log.pose, "color": log.color, "depth": log.depth, "labels": log.labels,
-    }[kind]  # fmt: skip
-    write(stamp_ns, log_ns, payload)  # type: ignore[operator]
+def _count(rate_hz: float, length_s: float) -> int:
+    """Frames in so many seconds, at least one; the margin is for products such as 4.35 s * 100 Hz = 434.99."""
+    return max(1, int(length_s * rate_hz + 1e-6))
 
 
-def _check(width: int, height: int, rate_hz: float, length_s: float, label_every: int) -> None:
+def _check(width: int, height: int, rate_hz: float, length_s: float) -> None:
     if not (32 <= width <= 4096 and 32 <= height <= 4096):
         raise UsageError(f"Images of {width}x{height} were asked for; each side must be from 32 to 4096 pixels.")
     if not 0.1 <= rate_hz <= 240:
         raise UsageError(f"{rate_hz:g} frames per second were asked for; give 0.1 to 240.")
     if not 0 < length_s <= 86_400:
         raise UsageError(f"A length of {length_s:g} s was asked for; give more than 0 and at most a day.")
-    if label_every < 1:
-        raise UsageError(f"Truth for every {label_every} frames was asked for; give 1 or more.")

@@ -86,7 +86,9 @@ def _grid(quads: Quads) -> tuple[F32, F32, I32, I32, I32]:
 
 def _openness(tracer: Tracer, points: F32, normals: F32, rays: int) -> F32:
     """(n,) 0..1: how far one can see from a point, averaged over a fixed cosine-weighted fan of rays."""
-    helper = np.where(np.abs(normals[:, 2:3]) < 0.9, np.float32([[0, 0, 1]]), np.float32([[1, 0, 0]]))
+    helper = np.where(
+        np.abs(normals[:, 2:3]) < 0.9, np.array([[0, 0, 1]], np.float32), np.array([[1, 0, 0]], np.float32)
+    )
     side = np.cross(normals, helper)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     other = np.cross(normals, side)

@@ -110,6 +110,6 @@ def _pyramid(picture: Picture) -> list[F32]:
     levels = [image]
     for _ in range(_LEVELS - 1):
         size = (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2))
-        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
         levels.append(image)
     return levels

@@ -89,7 +89,8 @@ class Builder:
 
     def world(self, point: tuple[float, float, float]) -> F64:
         """(3,) world coordinates of a point of the local frame."""
-        return (self._rotation * np.array(point, np.float64)).sum(1) + self.origin
+        moved = (self._rotation * np.array(point, np.float64)).sum(1) + self.origin
+        return np.asarray(moved, np.float64)
 
     def quad(
         self, corners: npt.ArrayLike, material: int, label: Label, *, fit: bool = False,

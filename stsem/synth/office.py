@@ -82,8 +82,11 @@ def _void(world: Builder, plan: FloorPlan, material: int) -> None:
     x0, x1 = -1.0, plan.length + 1.0
     y0, y1, z0, z1 = -7.0, plan.width + 7.0, -0.5, CEILING + 0.5
     for corners in (
-        [(x0, y1, z0), (x1, y1, z0), (x1, y1, z1), (x0, y1, z1)], [(x1, y0, z0), (x0, y0, z0), (x0, y0, z1), (x1, y0, z1)],
-        [(x0, y0, z0), (x0, y1, z0), (x0, y1, z1), (x0, y0, z1)], [(x1, y1, z0), (x1, y0, z0), (x1, y0, z1), (x1, y1, z1)],
-        [(x0, y0, z0), (x1, y0, z0), (x1, y1, z0), (x0, y1, z0)], [(x0, y1, z1), (x1, y1, z1), (x1, y0, z1), (x0, y0, z1)],
-    ):  # fmt: skip
+        [(x0, y1, z0), (x1, y1, z0), (x1, y1, z1), (x0, y1, z1)],
+        [(x1, y0, z0), (x0, y0, z0), (x0, y0, z1), (x1, y0, z1)],
+        [(x0, y0, z0), (x0, y1, z0), (x0, y1, z1), (x0, y0, z1)],
+        [(x1, y1, z0), (x1, y0, z0), (x1, y0, z1), (x1, y1, z1)],
+        [(x0, y0, z0), (x1, y0, z0), (x1, y1, z0), (x0, y1, z0)],
+        [(x0, y1, z1), (x1, y1, z1), (x1, y0, z1), (x0, y0, z1)],
+    ):
         world.quad(corners, material, Label.WALL)

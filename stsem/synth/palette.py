@@ -10,12 +10,13 @@ from stsem.synth.materials import MaterialTable
 from stsem.synth.patterns import Rgb, Rng
 
 _WALLS: tuple[Rgb, ...] = (
-    (0.90, 0.88, 0.82), (0.85, 0.87, 0.88), (0.88, 0.84, 0.72), (0.78, 0.84, 0.80), (0.80, 0.82, 0.90), (0.92, 0.91, 0.89),
-    (0.87, 0.78, 0.72),
+    (0.90, 0.88, 0.82), (0.85, 0.87, 0.88), (0.88, 0.84, 0.72), (0.78, 0.84, 0.80), (0.80, 0.82, 0.90),
+    (0.92, 0.91, 0.89), (0.87, 0.78, 0.72),
 )  # fmt: skip
 _CARPETS: tuple[tuple[Rgb, Rgb], ...] = (
-    ((0.33, 0.36, 0.42), (0.60, 0.64, 0.70)), ((0.42, 0.33, 0.30), (0.66, 0.55, 0.45)), ((0.30, 0.38, 0.33), (0.56, 0.64, 0.50)),
-    ((0.24, 0.29, 0.42), (0.50, 0.55, 0.72)), ((0.46, 0.44, 0.42), (0.25, 0.24, 0.24)), ((0.45, 0.25, 0.26), (0.70, 0.50, 0.45)),
+    ((0.33, 0.36, 0.42), (0.60, 0.64, 0.70)), ((0.42, 0.33, 0.30), (0.66, 0.55, 0.45)),
+    ((0.30, 0.38, 0.33), (0.56, 0.64, 0.50)), ((0.24, 0.29, 0.42), (0.50, 0.55, 0.72)),
+    ((0.46, 0.44, 0.42), (0.25, 0.24, 0.24)), ((0.45, 0.25, 0.26), (0.70, 0.50, 0.45)),
 )  # fmt: skip
 _PLANKS: tuple[Rgb, ...] = ((0.66, 0.48, 0.30), (0.55, 0.38, 0.24), (0.74, 0.60, 0.43), (0.50, 0.42, 0.36))
 _TILES: tuple[Rgb, ...] = ((0.62, 0.60, 0.56), (0.52, 0.53, 0.55), (0.66, 0.58, 0.48))
@@ -41,12 +42,12 @@ _CUPBOARDS: tuple[Rgb, ...] = (
     (0.48, 0.56, 0.60),
 )
 _CLOTH: tuple[Rgb, ...] = (
-    (0.12, 0.16, 0.32), (0.45, 0.10, 0.12), (0.12, 0.30, 0.22), (0.10, 0.10, 0.11), (0.22, 0.34, 0.55), (0.62, 0.36, 0.12),
-    (0.36, 0.16, 0.40),
+    (0.12, 0.16, 0.32), (0.45, 0.10, 0.12), (0.12, 0.30, 0.22), (0.10, 0.10, 0.11), (0.22, 0.34, 0.55),
+    (0.62, 0.36, 0.12), (0.36, 0.16, 0.40),
 )  # fmt: skip
 _SHIRTS: tuple[Rgb, ...] = (
-    (0.80, 0.16, 0.18), (0.16, 0.32, 0.72), (0.88, 0.86, 0.84), (0.92, 0.66, 0.14), (0.20, 0.55, 0.30), (0.55, 0.22, 0.58),
-    (0.30, 0.62, 0.70), (0.88, 0.48, 0.50),
+    (0.80, 0.16, 0.18), (0.16, 0.32, 0.72), (0.88, 0.86, 0.84), (0.92, 0.66, 0.14), (0.20, 0.55, 0.30),
+    (0.55, 0.22, 0.58), (0.30, 0.62, 0.70), (0.88, 0.48, 0.50),
 )  # fmt: skip
 _TROUSERS: tuple[Rgb, ...] = (
     (0.14, 0.18, 0.30),
@@ -136,18 +137,23 @@ def furnish_palette(table: MaterialTable, layout: int) -> Palette:
         keyboard=table.fitted(pictures.keyboard(rng, dark_pc)),
         door=table.fitted(pictures.door_leaf(rng, frame, bool(rng.random() < 0.3))),
         door_frame=table.tiled(patterns.wood(rng, tuple_scaled(frame, 0.72), 128), 0.8),
-        window_frame=table.tiled(patterns.speckled(rng, pick(rng, ((0.92, 0.92, 0.91), (0.55, 0.56, 0.58)), 0.02)), 0.8),
+        window_frame=table.tiled(
+            patterns.speckled(rng, pick(rng, ((0.92, 0.92, 0.91), (0.55, 0.56, 0.58)), 0.02)), 0.8
+        ),
         views=tuple(table.fitted(pictures.outside(rng, daylight), 1.5) for _ in range(3)),
         paintings=tuple(table.fitted(pictures.painting(rng)) for _ in range(7)),
         picture_frames=tuple(
-            table.tiled(patterns.wood(rng, c, 128), 0.6) for c in ((0.12, 0.10, 0.09), (0.70, 0.55, 0.25), (0.45, 0.28, 0.16))
+            table.tiled(patterns.wood(rng, c, 128), 0.6)
+            for c in ((0.12, 0.10, 0.09), (0.70, 0.55, 0.25), (0.45, 0.28, 0.16))
         ),
         cupboards=cupboards,
         cupboard_fronts=tuple(_fronts(rng, table, c) for c in bodies),
         bins=tuple(table.tiled(patterns.speckled(rng, pick(rng, _BINS, 0.04), 0.07), 0.6) for _ in range(2)),
         lamp_body=table.tiled(patterns.speckled(rng, pick(rng, ((0.75, 0.75, 0.74), (0.16, 0.16, 0.17)), 0.03)), 0.6),
         lamp_glow=table.tiled(patterns.speckled(rng, (1.0, 0.97, 0.88), 0.015), 0.6, 2.6),
-        lamp_shade=table.tiled(patterns.speckled(rng, pick(rng, ((0.95, 0.85, 0.62), (0.92, 0.70, 0.40)), 0.03), 0.03), 0.6, 1.0),
+        lamp_shade=table.tiled(
+            patterns.speckled(rng, pick(rng, ((0.95, 0.85, 0.62), (0.92, 0.70, 0.40)), 0.03), 0.03), 0.6, 1.0
+        ),
     )  # fmt: skip
 
 

@@ -118,7 +118,7 @@ def _track(plan: FloorPlan, seed: int, length_m: float) -> F64:
     smooth = np.column_stack([_smoothed(points[:, k], _CORNER_M / 0.01) for k in (0, 1)])
     moved = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(smooth, axis=0), axis=1))])
     keep = np.concatenate([[True], np.diff(moved) > 1e-9])
-    return np.column_stack([moved, smooth])[keep]
+    return np.asarray(np.column_stack([moved, smooth])[keep], np.float64)
 
 
 def _door_middle(room: Room, y: float) -> tuple[float, float]:
@@ -142,11 +142,11 @@ def _smoothed(values: F64, sigma: float) -> F64:
     reach = int(np.ceil(3 * sigma))
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     padded = np.pad(values, reach, mode="edge")
-    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
+    return np.asarray(np.convolve(padded, kernel / kernel.sum(), mode="valid"), np.float64)
 
 
 def _gaze(office: Office, seed: int, places: F64, ahead: F64, moves: Profile) -> tuple[F64, F64]:
-    """Yaw and pitch: glances at things nearby, the least seen class first, otherwise ahead; a critically damped follow."""
+    """Yaw and pitch: glances at things nearby, least seen class first, otherwise ahead; a critically damped follow."""
     rng = generator(seed, "gaze")
     seen: dict[int, int] = {}
     direction = ahead[0] - places[0]

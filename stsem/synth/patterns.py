@@ -1,4 +1,9 @@
-"""Procedural surfaces: carpet, wood, paint, tiles, fabric. Every function returns (h, w, 3) float in 0..1, sRGB, tileable."""
+"""Procedural surfaces: carpet, wood, paint, tiles, fabric.
+
+Every function returns (h, w, 3) float in 0..1, sRGB, tileable.
+"""
+
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -50,7 +55,7 @@ def carpet(rng: Rng, base: Rgb, fleck: Rgb) -> Picture:
     """A short-pile carpet with coloured flecks and trodden patches."""
     picture = tinted(base, 0.10 * cloud(rng, 1.2), 0.14 * cloud(rng, 0.2))
     spots = cv2.GaussianBlur((rng.random((SIZE, SIZE)) > 0.988).astype(np.float64), (3, 3), 0)[..., None] * 2.2
-    return np.clip(picture * (1 - spots) + np.asarray(fleck) * spots, 0, 1)
+    return np.asarray(np.clip(picture * (1 - spots) + np.asarray(fleck) * spots, 0, 1), np.float64)
 
 
 def carpet_tiles(rng: Rng, base: Rgb, fleck: Rgb) -> Picture:
@@ -102,7 +107,7 @@ def striped(rng: Rng, base: Rgb, other: Rgb, count: int = 8) -> Picture:
     """Cloth with stripes along the columns."""
     y = np.mgrid[:SMALL, :SMALL][0]
     share = (np.sin(y * 2 * np.pi * count / SMALL) > 0.2)[..., None]
-    return np.clip(woven(rng, base) * ~share + woven(rng, other) * share, 0, 1)
+    return np.asarray(np.clip(woven(rng, base) * ~share + woven(rng, other) * share, 0, 1), np.float64)
 
 
 def ceiling_tiles(rng: Rng, base: Rgb) -> Picture:
@@ -132,8 +137,8 @@ def floor_tiles(rng: Rng, base: Rgb, joint: Rgb) -> Picture:
     count = 5
     edges = np.linspace(0, SIZE, count + 1).astype(int)
     picture = tinted(base, 0.06 * cloud(rng, 1.3), 0.05 * cloud(rng, 0.4))
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
-        for c, d in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
+        for c, d in pairwise(edges):
             picture[a:b, c:d] *= rng.uniform(0.88, 1.08)
     for edge in edges[:-1]:
         picture[edge : edge + 4] = joint

@@ -3,6 +3,8 @@
 Every function returns (h, w, 3) float in 0..1, sRGB.
 """
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 
@@ -44,8 +46,8 @@ def grid_art(rng: Rng, height: int = 256, width: int = 320) -> Picture:
     picture = np.full((height, width, 3), 0.92)
     xs = [0, *sorted(int(v) for v in rng.integers(20, width - 20, 4)), width]
     ys = [0, *sorted(int(v) for v in rng.integers(20, height - 20, 3)), height]
-    for a, b in zip(ys[:-1], ys[1:], strict=True):
-        for c, d in zip(xs[:-1], xs[1:], strict=True):
+    for a, b in pairwise(ys):
+        for c, d in pairwise(xs):
             if rng.random() < 0.65:
                 picture[a:b, c:d] = _colour(rng)
             cv2.rectangle(picture, (c, a), (d, b), (0.06, 0.06, 0.06), 6)
@@ -57,8 +59,9 @@ def painting(rng: Rng) -> Picture:
     kind = (landscape, abstract, grid_art)[int(rng.integers(3))]
     picture = kind(rng)
     if rng.random() < 0.5:
-        picture = cv2.copyMakeBorder(picture, 26, 26, 26, 26, cv2.BORDER_CONSTANT, value=(0.9, 0.88, 0.84))
-    return np.asarray(picture, np.float64)
+        mounted = cv2.copyMakeBorder(picture, 26, 26, 26, 26, cv2.BORDER_CONSTANT, value=(0.9, 0.88, 0.84))
+        return np.asarray(mounted, np.float64)
+    return picture
 
 
 def outside(rng: Rng, bright: float, height: int = 256, width: int = 256) -> Picture:

@@ -31,7 +31,7 @@ def expose(radiance: F32, gain: float, rng: np.random.Generator | None) -> Image
     levels = 255 * linear**_GAMMA
     if rng is not None:
         levels += rng.standard_normal(levels.shape, np.float32) * np.float32(_GRAIN)
-    return np.clip(np.rint(levels), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.rint(levels), 0, 255), np.uint8)
 
 
 def millimetres(depth: Depth) -> npt.NDArray[np.uint16]:
@@ -54,7 +54,7 @@ def kinect(depth: Depth, focal_px: float, rng: np.random.Generator) -> Depth:
     sigma = 0.0012 + 0.0019 * (z - 0.4) ** 2
     z = z + sigma * _correlated(width, height, rng)
     scale = np.float32(_REFERENCE_FOCAL * 640 * _BASELINE_M * _DISPARITY_STEPS)
-    z = scale / np.maximum(np.rint(scale / np.maximum(z, 0.1)), 1)
+    z = np.asarray(scale / np.maximum(np.rint(scale / np.maximum(z, 0.1)), 1), np.float32)
     bad = hidden | (z < _NEAREST_M) | (z > _FARTHEST_M)
     return np.where(bad, np.float32(np.nan), z).astype(np.float32)
 

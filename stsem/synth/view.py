@@ -17,6 +17,8 @@ from stsem.synth.vocabulary import Label
 
 _SUBPIXELS = ((-0.125, -0.375), (0.375, -0.125), (-0.375, 0.125), (0.125, 0.375))
 
+_Columns = npt.NDArray[np.integer] | npt.NDArray[np.floating]
+
 
 @dataclass(frozen=True)
 class LitBody:
@@ -80,7 +82,7 @@ def look(
     return View(colour.reshape(*shape, 3), depth, labels)
 
 
-def _rays(camera: Camera, T_WC: Pose, x: npt.NDArray[np.generic], y: npt.NDArray[np.generic]) -> F32:
+def _rays(camera: Camera, T_WC: Pose, x: _Columns, y: _Columns) -> F32:
     """(n, 3) world directions with unit z in the camera, so that a ray's length is depth."""
     u = ((x - camera.cx) / camera.fx).astype(np.float32)[:, None]
     v = ((y - camera.cy) / camera.fy).astype(np.float32)[:, None]
@@ -103,7 +105,7 @@ def _cast(bodies: list[LitBody], T_WC: Pose, rays: F32) -> _Seen:
 
 
 def _labels(bodies: list[LitBody], seen: _Seen) -> Labels:
-    labels = bodies[0].quads.label[seen.quad * (seen.body == 0)]
+    labels = np.asarray(bodies[0].quads.label[seen.quad * (seen.body == 0)], np.uint8)
     for k, body in enumerate(bodies[1:], 1):
         mine = seen.body == k
         labels[mine] = body.quads.label[seen.quad[mine]]

@@ -54,9 +54,9 @@ class Walker:
         return lit_body(quads, Tracer(quads), light, self.office.materials)
 
 
-def walker(office: Office, seed: int) -> list[Walker]:
-    """The walkers of an office: one, whose place and speed depend on the seed."""
+def walker(office: Office, tracer: Tracer, seed: int) -> list[Walker]:
+    """The walkers of an office: one, whose place and speed depend on the seed; `tracer` holds the static scene."""
     rng = generator(seed, "walker")
     outfit = office.walkers[int(rng.integers(len(office.walkers)))]
     start = float(rng.uniform(0, 2 * (office.plan.length - 2 * _END_M)))
-    return [Walker(office, Tracer(office.quads), outfit, float(rng.uniform(0.7, 1.1)), start)]
+    return [Walker(office, tracer, outfit, float(rng.uniform(0.7, 1.1)), start)]
