@@ -2,6 +2,8 @@
 
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Protocol, Self
@@ -50,34 +52,35 @@ class LogWriter:
         classes: names and colours; they go into the metadata record `stsem.classes` and the attachment `classes.json`.
 
     Raises:
-        OutputError: the file cannot be written.
+        OutputError: the file cannot be written; a place that cannot be is found out at once.
     """
 
     def __init__(self, path: Path, classes: ClassSet) -> None:
         self._path, self._aside, self._classes = path, path.with_name(f".{path.name}.{os.getpid()}"), classes
+        self._counts = dict.fromkeys(_SCHEMAS, 0)
+        self._last_ns = 0
         self._stream: IO[bytes] = self._open()
         self._writer = Writer(
             self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
         )
-        self._writer.start("", f"stsem {__version__}")
-        names = {str(i): name for i, name in enumerate(classes.names)}
-        self._writer.add_metadata("stsem.classes", names)
-        self._channels = {topic: self._register(topic, schema) for topic, schema in _SCHEMAS.items()}
-        self._counts = dict.fromkeys(_SCHEMAS, 0)
-        self._last_ns = 0
+        with self._whole_or_nothing():
+            self._writer.start("", f"stsem {__version__}")
+            names = {str(i): name for i, name in enumerate(classes.names)}
+            self._writer.add_metadata("stsem.classes", names)
+            self._channels = {topic: self._register(topic, schema) for topic, schema in _SCHEMAS.items()}
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
         if kind is not None:
-            self._stream.close()
-            self._aside.unlink(missing_ok=True)
+            self._discard()
             return
-        self._writer.add_attachment(0, self._last_ns, "classes.json", "application/json", self._class_table())
-        self._writer.finish()
-        self._stream.close()
-        self._aside.replace(self._path)
+        with self._whole_or_nothing():
+            self._writer.add_attachment(0, self._last_ns, "classes.json", "application/json", self._class_table())
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._stream.close()
+            self._aside.replace(self._path)
 
     def color(self, stamp_ns: int, log_ns: int, image: Image) -> None:
         """A colour image (H, W, 3) uint8 RGB, as JPEG."""
@@ -114,10 +117,32 @@ class LogWriter:
         self._write("/pose", stamp_ns, log_ns, fox.PoseInFrame(timestamp=_stamp(stamp_ns), frame_id=WORLD, pose=pose))
 
     def _open(self) -> IO[bytes]:
+        if self._path.is_dir():
+            raise OutputError(f"The log {self._path} cannot be written: it is a folder; give the name of a file in it.")
         try:
             return self._aside.open("wb")
         except OSError as err:
-            raise OutputError(f"The log {self._path} cannot be written: {err.strerror}; choose another place.") from err
+            raise self._unwritable(err) from err
+
+    @contextmanager
+    def _whole_or_nothing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as err:
+            self._discard()
+            raise self._unwritable(err) from err
+        except BaseException:
+            self._discard()
+            raise
+
+    def _discard(self) -> None:
+        """Closing flushes, which fails once more on a full disk."""
+        with suppress(OSError):
+            self._stream.close()
+        self._aside.unlink(missing_ok=True)
+
+    def _unwritable(self, err: OSError) -> OutputError:
+        return OutputError(f"The log {self._path} cannot be written: {err.strerror or err}; choose another place.")
 
     def _register(self, topic: str, schema: Any) -> int:
         described = schema.get_schema()
@@ -127,7 +152,10 @@ class LogWriter:
     def _write(self, topic: str, stamp_ns: int, log_ns: int, message: _Encodable) -> None:
         if log_ns < self._last_ns:
             raise ValueError(f"{topic} at {log_ns} ns came after a message at {self._last_ns} ns")
-        self._writer.add_message(self._channels[topic], log_ns, message.encode(), stamp_ns, self._counts[topic])
+        try:
+            self._writer.add_message(self._channels[topic], log_ns, message.encode(), stamp_ns, self._counts[topic])
+        except OSError as err:
+            raise self._unwritable(err) from err
         self._counts[topic] += 1
         self._last_ns = log_ns
 
