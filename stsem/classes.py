@@ -56,9 +56,9 @@ class ClassSet:
         return next((i for i, own in enumerate(self.names) if normalised(own) == wanted), None)
 
     def palette(self) -> npt.NDArray[np.uint8]:
-        """(256, 3) RGB; row 255 is black. Own colours if given, else well separated hues."""
+        """(256, 3) RGB; row 255 is black. Own colours if given, else a default table."""
         table = np.zeros((256, 3), np.uint8)
-        own = self.colours or tuple(_hue(i) for i in range(len(self.names)))
+        own = self.colours or tuple(_default_colour(i) for i in range(len(self.names)))
         table[: len(own)] = np.array(own, np.uint8)
         return table
 
@@ -90,9 +90,15 @@ def _known(classes: ClassSet, name: str) -> int:
     return found
 
 
-def _hue(i: int) -> Colour:
-    """Golden-angle walk over hue with three levels of value."""
-    hue, value = (i * 0.61803398875) % 1.0 * 6.0, (230, 180, 130)[i // 5 % 3]
-    ramp = [max(0.0, min(1.0, abs((hue + shift) % 6.0 - 3.0) - 1.0)) for shift in (0.0, 4.0, 2.0)]
-    r, g, b = (int(value * (0.15 + 0.85 * x)) for x in ramp)
-    return r, g, b
+def _default_colour(i: int) -> Colour:
+    """A table of muted colours that stay apart; beyond its end the same ones darker."""
+    r, g, b = _DEFAULT_COLOURS[i % len(_DEFAULT_COLOURS)]
+    shade = 0.72 ** (i // len(_DEFAULT_COLOURS) % 4)
+    return int(r * shade), int(g * shade), int(b * shade)
+
+
+_DEFAULT_COLOURS: tuple[Colour, ...] = (
+    (91, 143, 199), (196, 120, 90), (240, 200, 80), (110, 110, 122), (205, 160, 190), (88, 140, 80), (210, 70, 75),
+    (150, 105, 170), (60, 70, 130), (230, 110, 160), (80, 170, 165), (140, 95, 60), (165, 190, 95), (235, 150, 60),
+    (120, 180, 225), (95, 60, 90), (190, 185, 160), (45, 105, 95), (225, 185, 165), (130, 130, 60),
+)  # fmt: skip

@@ -8,9 +8,11 @@ from stsem.document.schema import Document
 from stsem.log.log import Log
 from stsem.mapping.ply import write_ply
 from stsem.pose import to_quaternion
-from stsem.replay.engine import ModeRun, Replayed
+from stsem.replay.engine import Replayed
+from stsem.replay.lanes import ModeRun
 from stsem.replay.record import Record
 from stsem.replay.runs import Context
+from stsem.report.annotated import AnnotatedLog
 from stsem.report.inputs import FrameRow, ReportInputs, StripFrame
 from stsem.result import Span
 from stsem.sim.trace import RunTrace, marks_of, trace_bytes
@@ -34,10 +36,16 @@ def report_inputs(context: Context, document: Document, scratch: Path, *, plots:
     )
 
 
+def finish_annotated(annotated: AnnotatedLog, context: Context) -> None:
+    """Add the map and close the file."""
+    clouds = [run.cloud for run in context.replayed.runs if run.cloud is not None]
+    if clouds:
+        points = clouds[-1].points
+        annotated.map(context.replayed.slots[-1].log_stamp_ns, points.xyz, points.labels)
+    annotated.close()
+
+
 def _rows(run: ModeRun, replayed: Replayed) -> list[FrameRow]:
-    record = run.real_time or run.offline
-    if record is None:
-        return []
     spans: dict[int, list[Span]] = defaultdict(list)
     for span in run.spans:
         spans[span.frame].append(span)
@@ -56,7 +64,7 @@ def _rows(run: ModeRun, replayed: Replayed) -> list[FrameRow]:
             delivered=own.get(result.index),
             streaming=streaming.get(result.index),
         )
-        for result in record.results
+        for result in run.record.results
     ]
 
 

@@ -3,17 +3,17 @@
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
 from stsem import hostclock
 from stsem.cli.console import note, progress
-from stsem.cli.inputs import report_inputs
+from stsem.cli.inputs import finish_annotated, report_inputs
 from stsem.document.canonical import to_bytes
 from stsem.document.difference import first_differences, repeatable_files
-from stsem.document.origin import Host
+from stsem.document.origin import Host, StageCost
 from stsem.document.schema import Document
 from stsem.errors import NotRepeatableError, UsageError
 from stsem.log.log import Log, open_log
@@ -24,6 +24,7 @@ from stsem.replay.documents import build_document
 from stsem.replay.engine import can_map, replay_log
 from stsem.replay.runs import Context
 from stsem.replay.timing import deadline_ns
+from stsem.report.annotated import AnnotatedLog
 from stsem.report.folder import check_target, folder_name, write_folder
 from stsem.report.terminal import closing_table
 from stsem.search.probe import Probe
@@ -89,10 +90,11 @@ def _session(log: Log, config: RunConfig) -> Session:
     return Session(log, config, model, costs, fused)
 
 
-def _replay(session: Session, began_ns: int, label: str) -> Context:
+def _replay(session: Session, annotated: AnnotatedLog | None) -> Context:
     log, config, model, costs = session.log, session.config, session.model, session.costing
-    with progress(label) as step:
-        replayed = replay_log(log, config, model, None if costs is None else costs.of, step)
+    watch = None if annotated is None else lambda mode, result, frame: annotated.answer(mode.name, result, frame)
+    with progress(f"Replaying {log.info.name}") as step:
+        replayed = replay_log(log, config, model, None if costs is None else costs.of, step, watch)
     return Context(log, config, model, costs, replayed, _sustainable(session))
 
 
@@ -113,12 +115,17 @@ def _sustainable(session: Session) -> dict[str, float | None]:
 
 
 def _write(session: Session, out: Path | None, began_ns: int) -> tuple[Document, Path]:
-    context = _replay(session, began_ns, f"Replaying {session.log.info.name}")
-    document = build_document(context, _host(session, began_ns))
-    folder = out or REPORTS / session.log.info.name / folder_name(document)
     with tempfile.TemporaryDirectory(prefix="stsem-") as scratch:
+        path = Path(scratch) / "annotated.mcap"
+        classes = session.model.classes
+        annotated = AnnotatedLog(path, classes) if session.config.annotate and classes is not None else None
+        context = _replay(session, annotated)
+        if annotated is not None:
+            finish_annotated(annotated, context)
+        document = build_document(context, _host(session, context, began_ns))
+        folder = out or REPORTS / session.log.info.name / folder_name(document)
         inputs = report_inputs(context, document, Path(scratch), plots=session.config.plots)
-        return document, write_folder(inputs, folder)
+        return document, write_folder(replace(inputs, annotated=None if annotated is None else path), folder)
 
 
 def _check_repeats(session: Session, first: Path, number: int) -> None:
@@ -135,7 +142,9 @@ def _check_repeats(session: Session, first: Path, number: int) -> None:
         raise NotRepeatableError(f"Replay {number} differs from the first ({first}): {where}.")
 
 
-def _host(session: Session, began_ns: int) -> Host:
+def _host(session: Session, context: Context, began_ns: int) -> Host:
+    replayed = context.replayed
+    inside = sum(sum(times) for times in replayed.stage_times_ns.values())
     return Host(
         paths={"log": ", ".join(map(str, session.log.info.paths)), "model": session.config.model,
                "costs": session.config.costs},
@@ -144,6 +153,11 @@ def _host(session: Session, began_ns: int) -> Host:
         started_at=hostclock.utc_now(),
         wall_s=(hostclock.wall_ns() - began_ns) / 1e9,
         cpu_s=hostclock.process_cpu_ns() / 1e9,
+        stages={
+            stage: StageCost(mean_ms=sum(times) / len(times) / 1e6, max_ms=max(times) / 1e6, n=len(times))
+            for stage, times in sorted(replayed.stage_times_ns.items())
+        },
+        overhead_ms=(replayed.wall_ns - inside) / max(1, len(replayed.slots)) / 1e6,
         peak_memory_bytes=hostclock.peak_memory_bytes(),
     )  # fmt: skip
 

@@ -6,6 +6,7 @@ from stsem.classes import ClassSet
 from stsem.document import accuracy as doc
 from stsem.metrics.accumulate import Judged
 from stsem.metrics.by_distance import DistanceRow, DistanceSummary
+from stsem.metrics.consistency import ConsistencyMeter
 from stsem.metrics.loss import Part
 from stsem.metrics.scorecard import Accuracy
 from stsem.metrics.scores import tally
@@ -60,3 +61,10 @@ def loss(parts: Mapping[str, Part | None], why: Mapping[str, str]) -> doc.Loss:
         network=values["network"], prediction=values["prediction"], scheduling=values["scheduling"],
         staleness=values["staleness"], n=doc.LossParts.model_validate(counts), why=dict(why),
     )  # fmt: skip
+
+
+def consistency(meter: ConsistencyMeter | None) -> doc.Consistency | None:
+    """Agreement of consecutive answers; None without a pair of them."""
+    if meter is None or (found := meter.compute()).pairs == 0:
+        return None
+    return doc.Consistency(score=found.miou, pairs=found.pairs, correspondence=found.correspondence)

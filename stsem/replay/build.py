@@ -11,11 +11,11 @@ import numpy as np
 from stsem.classes import NO_LABEL, ClassSet, Labels, translation
 from stsem.errors import ClassTableError
 from stsem.inference.cache import CachedInferencer, OutputCache, cache_root
-from stsem.inference.inferencer import Inferencer
 from stsem.inference.network import Network, load_network
 from stsem.log.log import Log
 from stsem.replay.answer import AnswerRule, Prediction
 from stsem.replay.config import RunConfig
+from stsem.replay.hosttimes import StageTimes, TimedInferencer, TimedPropagation, TimedRegister
 from stsem.replay.memo import Memo
 from stsem.replay.modes import Mode
 from stsem.stages.propagate import PROPAGATIONS
@@ -37,7 +37,7 @@ class Model:
         classes: of every label image in the run: the log's, or the network's when the log's cannot be used.
         translation: (256,) from the network's ids to `classes`; None for the oracle.
         reason: why accuracy cannot be measured; "" when it can.
-        segmenter: makes the segmenter for a number of threads.
+        segmenter: makes the segmenter for a number of threads, timed into the given times.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Model:
     classes: ClassSet | None
     translation: Labels | None
     reason: str
-    segmenter: Callable[[int], Segmenter]
+    segmenter: Callable[[int, StageTimes], Segmenter]
 
 
 def build_model(log: Log, config: RunConfig) -> Model:
@@ -63,7 +63,7 @@ def build_model(log: Log, config: RunConfig) -> Model:
     return Model(Path(config.model).name, network, classes, table, reason, make)
 
 
-def build_rule(mode: Mode, segmenter: Segmenter, config: RunConfig) -> AnswerRule:
+def build_rule(mode: Mode, segmenter: Segmenter, config: RunConfig, times: StageTimes) -> AnswerRule:
     """The steps of `mode`, with a memory of their own."""
     if mode.segments_every_frame:
         return AnswerRule(segmenter, None)
@@ -73,7 +73,8 @@ def build_rule(mode: Mode, segmenter: Segmenter, config: RunConfig) -> AnswerRul
     )  # fmt: skip
     method = PROPAGATIONS[config.propagation]()
     needed = policy.needs_homography or method.needs_homography
-    return AnswerRule(segmenter, Prediction(policy, method, Register(config.seed) if needed else None))
+    register = TimedRegister(Register(config.seed), times) if needed else None
+    return AnswerRule(segmenter, Prediction(policy, TimedPropagation(method, times), register))
 
 
 def truth_frames(log: Log) -> frozenset[int]:
@@ -89,7 +90,7 @@ def _oracle(log: Log) -> Model:
             "choose a network with --model."
         )
     segmenter = OracleSegmenter(truth_frames(log).__contains__, log.truth)
-    return Model("oracle", None, log.classes, None, "", lambda threads: Memo(segmenter))
+    return Model("oracle", None, log.classes, None, "", lambda threads, times: Memo(segmenter))
 
 
 def _meeting(network: ClassSet, log: Log, config: RunConfig) -> tuple[ClassSet, Labels, str]:
@@ -124,8 +125,12 @@ def _class_map(path: Path | None) -> dict[str, str]:
     return table
 
 
-def _network_segmenter(network: Network, table: Labels, log: Log, config: RunConfig, threads: int) -> Segmenter:
-    inferencer = Inferencer(network, backend=config.backend, precision=config.precision, threads=threads)
+def _network_segmenter(
+    network: Network, table: Labels, log: Log, config: RunConfig, threads: int, times: StageTimes
+) -> Segmenter:
+    inferencer = TimedInferencer(
+        network, backend=config.backend, precision=config.precision, threads=threads, times=times
+    )
     if config.costs == "measured":
         return NetworkSegmenter(inferencer, table)
     if not config.cache or config.repeat > 1:  # an answer read back would hide that the network does not repeat

@@ -7,7 +7,7 @@ from stsem.replay.answer import AnswerRule
 from stsem.replay.realtime import Judge
 from stsem.replay.schedule import Slot
 from stsem.result import FrameResult, Outcome
-from stsem.stages.fuse import Fuse
+from stsem.stages.fuse import Fuser
 
 
 class OfflineRun:
@@ -22,7 +22,7 @@ class OfflineRun:
     """
 
     def __init__(
-        self, slots: tuple[Slot, ...], rule: AnswerRule, judge: Judge, *, fuse: Fuse | None, only_truth: bool
+        self, slots: tuple[Slot, ...], rule: AnswerRule, judge: Judge, *, fuse: Fuser | None, only_truth: bool
     ) -> None:
         self._slots, self._rule, self._judge, self._fuse = slots, rule, judge, fuse
         self._only_truth = only_truth

@@ -1,15 +1,21 @@
 """What is kept of a run: every frame's result without its pixels, the judgement, and a few frames to look at."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from stsem.classes import NO_LABEL, ClassSet, Labels
+from stsem.frame import Frame
 from stsem.log.log import Loaded
+from stsem.metrics.consistency import ConsistencyMeter
 from stsem.metrics.scorecard import Scorecard
 from stsem.replay.realtime import NewestAnswer
 from stsem.replay.schedule import Slot
 from stsem.result import FrameResult, Outcome
+
+Watch = Callable[[FrameResult, Frame], None]
+"""Called with the result of an answered frame, labels included, and the frame."""
 
 
 class Record:
@@ -19,11 +25,22 @@ class Record:
         slots: every frame of the log, in log order.
         scorecard: None when accuracy cannot be measured.
         watched: log indices whose answers are kept for pictures.
+        classes: of the answers; None to leave temporal consistency out.
+        watch: called with every answered frame; None when nobody looks.
     """
 
-    def __init__(self, slots: tuple[Slot, ...], scorecard: Scorecard | None, watched: frozenset[int]) -> None:
+    def __init__(
+        self,
+        slots: tuple[Slot, ...],
+        scorecard: Scorecard | None,
+        watched: frozenset[int],
+        classes: ClassSet | None = None,
+        watch: Watch | None = None,
+    ) -> None:
         self._slots, self._watched = slots, watched
         self.scorecard = scorecard
+        self.consistency = None if classes is None else ConsistencyMeter(len(classes))
+        self._watch = watch
         self.results: list[FrameResult] = []
         self.answers: dict[int, Labels] = {}
 
@@ -43,9 +60,17 @@ class Record:
         never_came = result.arrival_ns is None and result.outcome in (Outcome.UNDECODABLE, Outcome.INCOMPLETE)
         if self.scorecard is not None and loaded.truth is not None and not never_came:
             self._judge(self.scorecard, result, loaded.truth)
-        if result.index in self._watched and result.labels is not None:
-            self.answers[result.index] = result.labels
+        if result.labels is not None:
+            self._look(result, loaded, result.labels)
         self.results.append(replace(result, labels=None, coverage=_coverage(result.labels)))
+
+    def _look(self, result: FrameResult, loaded: Loaded, labels: Labels) -> None:
+        if result.index in self._watched:
+            self.answers[result.index] = labels
+        if self.consistency is not None:
+            self.consistency.update(labels)
+        if self._watch is not None and loaded.frame is not None:
+            self._watch(result, loaded.frame)
 
     def _judge(self, scorecard: Scorecard, result: FrameResult, truth: Labels) -> None:
         slot = self._slot(result.index)

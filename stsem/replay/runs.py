@@ -17,7 +17,8 @@ from stsem.replay import accuracy, timing
 from stsem.replay.build import Model
 from stsem.replay.config import RunConfig
 from stsem.replay.costing import Costing
-from stsem.replay.engine import ModeRun, Replayed
+from stsem.replay.engine import Replayed
+from stsem.replay.lanes import ModeRun
 from stsem.replay.record import Record
 from stsem.result import Outcome
 
@@ -73,9 +74,7 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
         base: `per-frame`, for the network's share of the loss; None if it did not run.
     """
     run, config = found.run, context.config
-    record = run.real_time or run.offline
-    if record is None:
-        raise ValueError(f"{run.mode.name} ran neither with a clock nor without")
+    record = run.record
     counts = count_outcomes((r.outcome for r in record.results), len(context.replayed.slots))
     late, fast, inside = _timing(context, run)
     own = None if found.clocked is None else found.clocked.own
@@ -103,6 +102,7 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
         loss=_loss(context, found, base),
         strata=accuracy.strata(found.offline, classes),
         by_distance=accuracy.distances(() if found.offline is None else found.offline.by_distance),
+        consistency=accuracy.consistency(record.consistency),
         by_distance_summary=accuracy.distance_summary(
             None if found.offline is None else found.offline.distance_summary
         ),

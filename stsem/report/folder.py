@@ -38,8 +38,9 @@ def write_folder(inputs: ReportInputs, folder: Path) -> Path:
         for name, make in _FILES.items():
             if (data := make(inputs)) is not None:
                 (aside / name).write_bytes(data)
-        if inputs.point_cloud is not None:
-            shutil.copyfile(inputs.point_cloud, aside / "map.ply")
+        for name, made in (("map.ply", inputs.point_cloud), ("annotated.mcap", inputs.annotated)):
+            if made is not None:
+                shutil.copyfile(made, aside / name)
         _write_views(inputs, aside)
     return folder
 

@@ -79,6 +79,7 @@ class ReportInputs:
         answer_classes: classes of the answers where the log has no class table; None where it has.
         trajectory: bytes of trajectory.txt; None without poses.
         point_cloud: the finished map.ply, copied into the folder; None without a map.
+        annotated: the finished annotated.mcap, copied into the folder; None without `--annotate`.
         plots: whether pictures are drawn (`--no-plots`).
     """
 
@@ -90,6 +91,7 @@ class ReportInputs:
     trajectory: bytes | None = None
     answer_classes: ClassSet | None = None
     point_cloud: Path | None = None
+    annotated: Path | None = None
     plots: bool = True
 
     def rows(self, mode: str) -> list[FrameRow]:

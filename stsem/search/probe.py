@@ -13,7 +13,7 @@ from stsem.geometry.homography import Homography, estimate
 from stsem.log.log import Loaded, Log
 from stsem.replay.answer import AnswerRule, Prediction
 from stsem.replay.config import RunConfig
-from stsem.replay.engine import CostsOf
+from stsem.replay.lanes import CostsOf
 from stsem.replay.modes import Mode
 from stsem.replay.queues import Mailbox, parse_queue
 from stsem.replay.realtime import Machine, NewestAnswer, RealTimeRun

@@ -1,0 +1,151 @@
+"""annotated.mcap: the answers of a run and its images on the log's own clock, for Foxglove, Lichtblick and Rerun."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from foxglove import messages as fox
+from mcap.well_known import MessageEncoding, SchemaEncoding
+from mcap.writer import CompressionType, Writer
+
+from stsem import __version__
+from stsem.classes import NO_LABEL, ClassSet, Labels
+from stsem.frame import Frame, Image
+from stsem.pose import to_quaternion
+from stsem.result import FrameResult
+
+_OPAQUE = 0.55
+_JPEG_QUALITY = 85
+_WORLD, _CAMERA = "world", "camera_optical"
+_ANSWER_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "frame": {"type": "integer"}, "outcome": {"type": "string"}, "keyframe": {"type": ["integer", "null"]},
+        "reason": {"type": "string"}, "latency_ms": {"type": ["number", "null"]},
+        "coverage": {"type": ["number", "null"]},
+    },
+}  # fmt: skip
+
+
+class AnnotatedLog:
+    """Writes channels per mode while a replay goes on; call `close` at the end.
+
+    Channels: `/stsem/MODE/overlay` (CompressedImage), `/stsem/MODE/labels` (RawImage rgb8 in the classes' colours),
+    `/stsem/MODE/answer` (JSON: outcome, keyframe, latency), `/stsem/pose` (FrameTransform), `/stsem/map` (PointCloud).
+    Message times are capture stamps of the log, so that it lines up with the log it was made from.
+
+    Args:
+        path: the file.
+        classes: names and colours of the labels.
+    """
+
+    def __init__(self, path: Path, classes: ClassSet) -> None:
+        self._stream = path.open("wb")
+        self._writer = Writer(self._stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        self._writer.start("", f"stsem {__version__}")
+        self._writer.add_metadata("stsem.classes", {str(i): name for i, name in enumerate(classes.names)})
+        self._palette = classes.palette()
+        self._channels: dict[str, int] = {}
+        self._posed: set[int] = set()
+
+    def answer(self, mode: str, result: FrameResult, frame: Frame) -> None:
+        """One answered frame of one mode; `result.labels` are shown at the size of the image."""
+        if result.labels is None:
+            return
+        labels, stamp = _at_size(result.labels, frame.size), frame.stamp_ns
+        colours = self._palette[labels]
+        self._message(f"/stsem/{mode}/overlay", stamp, _jpeg(_blend(frame.image, colours, labels), stamp))
+        self._message(f"/stsem/{mode}/labels", stamp, _raw_rgb(colours, stamp))
+        self._json(f"/stsem/{mode}/answer", stamp, _facts(result))
+        if frame.T_WC is not None and frame.index not in self._posed:
+            self._posed.add(frame.index)
+            self._message("/stsem/pose", stamp, _transform(frame.T_WC, stamp))
+
+    def map(self, stamp_ns: int, xyz: npt.NDArray[np.float64], labels: Labels) -> None:
+        """The labelled points (n, 3) in world metres, coloured by class, shown from `stamp_ns` on."""
+        packed = np.zeros(len(xyz), np.dtype([("xyz", "<f4", 3), ("rgba", "u1", 4), ("label", "u1")]))
+        packed["xyz"], packed["label"] = xyz, labels
+        packed["rgba"][:, :3], packed["rgba"][:, 3] = self._palette[labels], 255
+        floats = [fox.PackedElementField(name=n, offset=4 * i, type=fox.PackedElementFieldNumericType.Float32)
+                  for i, n in enumerate("xyz")]  # fmt: skip
+        bytes_ = [fox.PackedElementField(name=n, offset=12 + i, type=fox.PackedElementFieldNumericType.Uint8)
+                  for i, n in enumerate(("red", "green", "blue", "alpha", "label"))]  # fmt: skip
+        cloud = fox.PointCloud(
+            timestamp=_stamp(stamp_ns), frame_id=_WORLD, pose=_identity(), point_stride=packed.itemsize,
+            fields=floats + bytes_, data=packed.tobytes(),
+        )  # fmt: skip
+        self._message("/stsem/map", stamp_ns, cloud)
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._stream.close()
+
+    def _message(self, topic: str, stamp_ns: int, message: Any) -> None:
+        if topic not in self._channels:
+            schema = type(message).get_schema()
+            schema_id = self._writer.register_schema(schema.name, schema.encoding, schema.data)
+            self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.Protobuf, schema_id)
+        self._writer.add_message(self._channels[topic], stamp_ns, message.encode(), stamp_ns)
+
+    def _json(self, topic: str, stamp_ns: int, facts: dict[str, Any]) -> None:
+        if topic not in self._channels:
+            schema = json.dumps(_ANSWER_SCHEMA).encode()
+            schema_id = self._writer.register_schema("stsem.Answer", SchemaEncoding.JSONSchema, schema)
+            self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.JSON, schema_id)
+        self._writer.add_message(self._channels[topic], stamp_ns, json.dumps(facts).encode(), stamp_ns)
+
+
+def _facts(result: FrameResult) -> dict[str, Any]:
+    latency = None
+    if result.answered_ns is not None and result.arrival_ns is not None:
+        latency = (result.answered_ns - result.arrival_ns) / 1e6
+    return {
+        "frame": result.index, "outcome": str(result.outcome), "keyframe": result.keyframe, "reason": result.reason,
+        "latency_ms": latency, "coverage": result.coverage,
+    }  # fmt: skip
+
+
+def _blend(image: Image, colours: Image, labels: Labels) -> Image:
+    mixed = cv2.addWeighted(image, 1 - _OPAQUE, colours, _OPAQUE, 0)
+    return np.where((labels == NO_LABEL)[:, :, None], image, mixed).astype(np.uint8)
+
+
+def _at_size(labels: Labels, size: tuple[int, int]) -> Labels:
+    if labels.shape == (size[1], size[0]):
+        return labels
+    return np.asarray(cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST_EXACT), np.uint8)
+
+
+def _jpeg(image: Image, stamp_ns: int) -> fox.CompressedImage:
+    settings = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
+    _, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), settings)
+    return fox.CompressedImage(timestamp=_stamp(stamp_ns), frame_id=_CAMERA, format="jpeg", data=data.tobytes())
+
+
+def _raw_rgb(image: Image, stamp_ns: int) -> fox.RawImage:
+    height, width = image.shape[:2]
+    return fox.RawImage(
+        timestamp=_stamp(stamp_ns), frame_id=_CAMERA, width=width, height=height, encoding="rgb8", step=3 * width,
+        data=image.tobytes(),
+    )  # fmt: skip
+
+
+def _transform(T_WC: npt.NDArray[np.float64], stamp_ns: int) -> fox.FrameTransform:
+    x, y, z = T_WC[:3, 3].tolist()
+    qx, qy, qz, qw = to_quaternion(T_WC).tolist()
+    return fox.FrameTransform(
+        timestamp=_stamp(stamp_ns), parent_frame_id=_WORLD, child_frame_id=_CAMERA,
+        translation=fox.Vector3(x=x, y=y, z=z), rotation=fox.Quaternion(x=qx, y=qy, z=qz, w=qw),
+    )  # fmt: skip
+
+
+def _identity() -> fox.Pose:
+    return fox.Pose(position=fox.Vector3(x=0, y=0, z=0), orientation=fox.Quaternion(x=0, y=0, z=0, w=1))
+
+
+def _stamp(stamp_ns: int) -> fox.Timestamp:
+    return fox.Timestamp(*divmod(stamp_ns, 10**9))
