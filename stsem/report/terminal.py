@@ -1,18 +1,14 @@
-"""What the command prints at its end: a short table, or a summary for machines."""
+"""What the command prints at its end: a short table and its basis."""
 
 from collections.abc import Callable
 
-from pydantic import JsonValue
 from tabulate import tabulate
 
 from stsem.document.schema import Document, Run
-from stsem.report.metrics import METRICS, row_delta, shown
-from stsem.report.wording import NOT_MEASURED
+from stsem.report.metrics import METRICS, row_delta
 
 _PATHS = ("offline.miou", "streaming.miou", "offline.pixel_accuracy", "latency_ms.from_arrival.p50",
           "latency_ms.from_arrival.p95", "throughput.output_hz")  # fmt: skip
-
-_SCORE_KEYS = {"miou", "pixel_accuracy", "classes_averaged", "n"}
 
 
 def closing_table(document: Document) -> str:
@@ -44,41 +40,6 @@ def basis(document: Document) -> str:
     if all(run.latency_ms is None for run in document.runs):
         return f"{accuracy} Offline: no clock, so no latency."
     return f"{accuracy} Latency from arrival, on the simulated clock."
-
-
-def summary(document: Document) -> dict[str, JsonValue]:
-    """What `--json` prints: state, digest and the headline numbers of each run, as in report.json."""
-    return {
-        "schema_version": document.schema_version,
-        "state": document.state,
-        "accuracy_state": document.accuracy_state,
-        "digest": document.digest,
-        "verdict": document.verdict.model_dump(mode="json"),
-        "runs": [_summary(run) for run in document.runs],
-    }
-
-
-def _summary(run: Run) -> JsonValue:
-    scores = {name: getattr(run, name) for name in ("offline", "delivered", "streaming")}
-    return {
-        "mode": run.mode,
-        "clock": run.clock,
-        "frames": run.frames,
-        "outcomes": run.outcomes.model_dump(mode="json"),
-        "keyframes": len(run.keyframes),
-        "coverage": run.coverage.model_dump(mode="json"),
-        **{
-            name: None if score is None else score.model_dump(mode="json", include=_SCORE_KEYS)
-            for name, score in scores.items()
-        },
-        "latency_ms": None if run.latency_ms is None else run.latency_ms.from_arrival.model_dump(mode="json"),
-        "output_hz": None if run.throughput is None else run.throughput.output_hz,
-    }  # fmt: skip
-
-
-def _shown(document: Document, run: Run, path: str) -> str:
-    judged = document.accuracy_state == "measured" or path.startswith(("latency_ms.", "throughput."))
-    return shown(run, path) if judged else NOT_MEASURED
 
 
 def _others(run: Run) -> int:

@@ -2,8 +2,7 @@
 
 from made_up_run import example
 
-from stsem.document.canonical import canonical
-from stsem.report.terminal import closing_table, summary
+from stsem.report.terminal import closing_table
 
 
 def test_closing_table_is_short_and_complete() -> None:
@@ -26,11 +25,3 @@ def test_without_truth_it_says_so() -> None:
 
 def test_offline_has_no_latency() -> None:
     assert "Offline: no clock, so no latency." in closing_table(example(pictures=False, clock=False).document)
-
-
-def test_summary_is_small_json() -> None:
-    document = example(pictures=False).document
-    found = summary(document)
-    assert found["digest"] == document.digest
-    assert found["runs"][1]["streaming"]["classes_averaged"] == 11  # type: ignore[index, call-overload]
-    assert len(canonical(found)) < 5000
