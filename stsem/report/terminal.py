@@ -5,7 +5,8 @@ from collections.abc import Callable
 from tabulate import tabulate
 
 from stsem.document.schema import Document, Run
-from stsem.report.metrics import METRICS, row_delta
+from stsem.report.metrics import METRICS, row_delta, shown
+from stsem.report.wording import NOT_MEASURED
 
 _PATHS = ("offline.miou", "streaming.miou", "offline.pixel_accuracy", "latency_ms.from_arrival.p50",
           "latency_ms.from_arrival.p95", "throughput.output_hz")  # fmt: skip
@@ -40,6 +41,11 @@ def basis(document: Document) -> str:
     if all(run.latency_ms is None for run in document.runs):
         return f"{accuracy} Offline: no clock, so no latency."
     return f"{accuracy} Latency from arrival, on the simulated clock."
+
+
+def _shown(document: Document, run: Run, path: str) -> str:
+    judged = document.accuracy_state == "measured" or path.startswith(("latency_ms.", "throughput."))
+    return shown(run, path) if judged else NOT_MEASURED
 
 
 def _others(run: Run) -> int:
