@@ -100,21 +100,36 @@ def _speed(seed: int, steps: int, moves: Profile) -> F64:
 
 
 def _track(plan: FloorPlan, seed: int, length_m: float) -> F64:
-    """(n, 3) distance, x, y every centimetre: a tour of the open rooms, in and out, over and over."""
+    """(n, 3) distance, x, y every centimetre, at least `length_m` long: tours of the open rooms, over and over."""
     rng = generator(seed, "tour")
+    nodes: list[tuple[float, float]] = []
+    track, wanted_m = np.zeros((1, 3)), length_m
+    while track[-1, 0] < length_m:
+        while _length(nodes) < wanted_m:
+            nodes += _tour(plan, rng, starts=not nodes)
+        track = _rounded(_resampled(np.array(nodes)))
+        wanted_m = _length(nodes) + length_m - float(track[-1, 0])  # rounding cuts corners
+    return track
+
+
+def _tour(plan: FloorPlan, rng: np.random.Generator, *, starts: bool) -> list[tuple[float, float]]:
+    """Corners of a way from the corridor into every open room and out again, in any order."""
     rooms = [room for room in plan.rooms if room.is_open]
     lane = plan.width * 0.58
     nodes: list[tuple[float, float]] = []
-    while _length(nodes) < length_m:
-        for k in rng.permutation(len(rooms)):
-            room = rooms[k]
-            door_x = _door_middle(room, 0.0)[0]
-            if not nodes:
-                offset = 1.6 if door_x < plan.length / 2 else -1.6
-                nodes.append((door_x + offset, lane))
-            inside = _door_middle(room, room.depth / 2)
-            nodes += [(door_x, lane), inside, room.to_world(room.width / 2, room.depth / 2), inside, (door_x, lane)]
-    points = _resampled(np.array(nodes))
+    for k in rng.permutation(len(rooms)):
+        room = rooms[k]
+        door_x = _door_middle(room, 0.0)[0]
+        if starts and not nodes:
+            offset = 1.6 if door_x < plan.length / 2 else -1.6
+            nodes.append((door_x + offset, lane))
+        inside = _door_middle(room, room.depth / 2)
+        nodes += [(door_x, lane), inside, room.to_world(room.width / 2, room.depth / 2), inside, (door_x, lane)]
+    return nodes
+
+
+def _rounded(points: F64) -> F64:
+    """(n, 3) distance, x, y along a polyline whose corners are rounded off."""
     smooth = np.column_stack([_smoothed(points[:, k], _CORNER_M / 0.01) for k in (0, 1)])
     moved = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(smooth, axis=0), axis=1))])
     keep = np.concatenate([[True], np.diff(moved) > 1e-9])
