@@ -9,10 +9,12 @@ Layouts 0 to 999 are for training and 5000 to 5099 for validation; the logs that
 import argparse
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from stsem import chance
 from stsem.camera import Camera
+from stsem.frame import Image
 from stsem.pose import Pose
 from stsem.synth.generate import office_camera
 from stsem.synth.office import Office
@@ -26,6 +28,7 @@ WIDTH, HEIGHT = 480, 270
 WALK_S, PERIOD_S = 60.0, 0.1
 MARGIN_M = 0.25
 ATTEMPTS = 6
+JPEG_QUALITY = 85
 
 
 def walked(layout: int, office: Office, count: int) -> list[tuple[Pose, Pose, float]]:
@@ -100,8 +103,14 @@ def render(layout: int, count: int, folder: Path) -> None:
                 if attempt == ATTEMPTS - 1 or _is_rich(views[0]):
                     break
         views.append(scene.look(camera, second, time_s + PERIOD_S))
-        images = np.stack([expose(view.radiance, 1.0, rng) for view in views])
+        images = np.stack([_recorded(expose(view.radiance, 1.0, rng)) for view in views])
         save_pair(folder / f"{layout:05}_{k:02}.npz", Pair(images, np.stack([view.labels for view in views])))
+
+
+def _recorded(image: Image) -> Image:
+    """The image as a log's JPEG gives it back: its faults are most of the difference when the robot stands."""
+    _, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return np.asarray(cv2.cvtColor(cv2.imdecode(data, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB), np.uint8)
 
 
 def _is_rich(view: View) -> bool:

@@ -12,16 +12,19 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch.nn.functional import interpolate
 
 from stsem import hostclock
-from stsem.classes import NO_LABEL, Labels
+from stsem.classes import Labels
 from stsem.frame import Image
 from stsem.inference.inferencer import Inferencer, segmentation
 from stsem.inference.network import load_network
+from stsem.inference.preprocess import labels_at, network_inputs
 from stsem.inference.sidecar import Difference, Sidecar
 from stsem.inference.threads import set_threads
 from stsem.log.log import open_log
 from stsem.metrics.confusion import ConfusionMatrix
+from stsem.models.two_stream import fuse
 from stsem.synth.vocabulary import OFFICE
 from stsem.train.augment import Augmentation
 from stsem.train.dataset import PairFolder, class_shares
@@ -87,21 +90,46 @@ def _of_log(path: Path) -> Iterator[Sample]:
                 yield loaded.frame.image, loaded.frame.previous, loaded.truth
 
 
+def _samples(args: argparse.Namespace) -> Iterator[Sample]:
+    return _of_log(args.log) if args.log else _of_pairs(args.pairs, args.prefix)
+
+
+def _show(name: str, matrix: ConfusionMatrix) -> None:
+    scores = matrix.compute()
+    print(f"{name}: mIoU {scores.miou:.2%} over {scores.classes_averaged} classes, "
+          f"pixel accuracy {scores.pixel_accuracy:.2%}")  # fmt: skip
+    print("  ".join(f"{name} {iou:.3f}" for name, iou in zip(OFFICE.names, scores.iou, strict=True)))
+
+
 def _judge(args: argparse.Namespace) -> None:
     set_threads(1)
     inferencer = Inferencer(load_network(args.network), threads=args.threads)
     matrix = ConfusionMatrix(len(OFFICE))
     spent = []
-    for image, previous, truth in _of_log(args.log) if args.log else _of_pairs(args.pairs, args.prefix):
+    for image, previous, truth in _samples(args):
         begun = hostclock.wall_ns()
         output = inferencer.compute(image, previous)
         spent.append(hostclock.wall_ns() - begun)
-        labels = segmentation(output, (image.shape[1], image.shape[0])).labels
-        matrix.update(np.where(truth < len(OFFICE), truth, NO_LABEL).astype(np.uint8), labels)
-    scores = matrix.compute()
-    print(f"{len(spent)} frames, mIoU {scores.miou:.2%} over {scores.classes_averaged} classes, "
-          f"pixel accuracy {scores.pixel_accuracy:.2%}, median {np.median(spent) / 1e6:.0f} ms a frame")  # fmt: skip
-    print("  ".join(f"{name} {iou:.3f}" for name, iou in zip(OFFICE.names, scores.iou, strict=True)))
+        matrix.update(truth, segmentation(output, (image.shape[1], image.shape[0])).labels)
+    _show(f"{args.network}, {len(spent)} frames, median {np.median(spent) / 1e6:.0f} ms", matrix)
+
+
+def _streams(args: argparse.Namespace) -> None:
+    """The fused answer beside each stream's own, in torch."""
+    torch.set_num_threads(args.threads)
+    network, sidecar = load_checkpoint(args.checkpoint, len(OFFICE)), _sidecar(tuple(args.size))
+    matrices = {name: ConfusionMatrix(len(OFFICE)) for name in ("fused", "colour", "difference")}
+    for image, previous, truth in _samples(args):
+        inputs = {name: torch.from_numpy(value) for name, value in network_inputs(image, previous, sidecar).items()}
+        with torch.no_grad():
+            logits = [network.colour(inputs["image"]), network.difference(inputs["difference"])]
+        colour, difference = (each.softmax(1) for each in logits)
+        for name, probabilities in zip(matrices, (fuse(*logits), colour, difference), strict=True):
+            full = interpolate(probabilities, size=tuple(args.size)[::-1], mode="bilinear", align_corners=True)
+            labels = full.argmax(1)[0].to(torch.uint8).numpy()
+            matrices[name].update(truth, labels_at(labels, (image.shape[1], image.shape[0])))
+    for name, matrix in matrices.items():
+        _show(name, matrix)
 
 
 def _arguments() -> argparse.Namespace:
@@ -128,10 +156,14 @@ def _arguments() -> argparse.Namespace:
     judge = verbs.add_parser("judge")
     judge.set_defaults(run=_judge)
     judge.add_argument("--network", default="default")
-    judge.add_argument("--log", type=Path)
-    for verb in (train, export):
+    streams = verbs.add_parser("streams")
+    streams.set_defaults(run=_streams)
+    streams.add_argument("--size", type=int, nargs=2, default=(473, 281))
+    for verb in (judge, streams):
+        verb.add_argument("--log", type=Path)
+    for verb in (train, export, streams):
         verb.add_argument("--checkpoint", type=Path, required=True)
-    for verb in (train, judge):
+    for verb in (train, judge, streams):
         verb.add_argument("--pairs", type=Path)
         verb.add_argument("--prefix", default="")
         verb.add_argument("--threads", type=int, default=2)
