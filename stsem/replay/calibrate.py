@@ -105,7 +105,7 @@ def _sample(
     while len(kept) < wanted and hostclock.wall_ns() - started < limit_ns:
         durations, quiet = _batch(work, supply)
         (kept if quiet else spoiled).extend(durations)
-    if len(kept) >= wanted:
+    if len(kept) >= wanted or not spoiled:
         return tuple(sorted(kept)), False
     return tuple(sorted(kept + spoiled)), True
 

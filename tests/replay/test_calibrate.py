@@ -146,6 +146,13 @@ def test_a_busy_machine_marks_the_profile(host: Host) -> None:
     assert all(profile.samples_ns.values())
 
 
+def test_a_slow_network_on_a_quiet_machine(host: Host) -> None:
+    """Few samples within the limit are few, but nobody disturbed them."""
+    profile = measure(subject(host, cores=(1,)), frames(), samples=12, limit_ns=3 * 10**8)
+    assert not profile.disturbed
+    assert 1 <= len(profile.samples_ns["segment@1"]) < 12
+
+
 @pytest.mark.parametrize(("share", "disturbed"), [(0.0, False), (0.09, False), (0.11, True), (None, False)])
 def test_where_quiet_ends(host: Host, share: float | None, disturbed: bool) -> None:
     """A tenth of one core is tolerated; a machine that cannot say is taken to be quiet."""
