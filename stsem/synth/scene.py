@@ -16,6 +16,7 @@ class Scene:
 
     Attributes:
         office: what was built.
+        tracer: its static surfaces.
 
     Raises:
         MissingExtraError: the extra `synth` is not installed.
@@ -24,10 +25,10 @@ class Scene:
     def __init__(self, layout: int, seed: int) -> None:
         self.office = build_office(layout)
         quads = self.office.quads
-        tracer = Tracer(quads)
-        light = illuminate(quads, tracer, self.office.furnishing.lights)
-        self._static = lit_body(quads, tracer, light, self.office.materials)
-        self._people = walker(self.office, tracer, seed)
+        self.tracer = Tracer(quads)
+        light = illuminate(quads, self.tracer, self.office.furnishing.lights)
+        self._static = lit_body(quads, self.tracer, light, self.office.materials)
+        self._people = walker(self.office, self.tracer, seed)
 
     def look(self, camera: Camera, T_WC: Pose, time_s: float) -> View:
         """What `camera` at `T_WC` would see `time_s` seconds into the walk, without any fault of a sensor."""

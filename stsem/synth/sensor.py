@@ -43,9 +43,10 @@ def millimetres(depth: Depth) -> npt.NDArray[np.uint16]:
 def kinect(depth: Depth, focal_px: float, rng: np.random.Generator) -> Depth:
     """Depth (H, W) as a structured-light camera would measure it, metres, NaN unknown.
 
-    Axial noise sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 (Nguyen, Izadi, Lovell 2012, equation 3), mixed depths at edges,
-    disparity in eighths of a pixel, and holes: out of range, at grazing incidence, and where the projector, 7.5 cm to
-    the side, is hidden.
+    Axial noise sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 (Nguyen, Izadi, Lovell 2012, equation 3), disparity in eighths of
+    a pixel, and holes: out of range, where the projector, 7.5 cm to the side, is hidden, and where depth changes faster
+    than at a grazing surface, which includes the two pixels at a high edge. At low edges, of 4 % of the depth up to
+    there, depths are mixed.
     """
     height, width = depth.shape
     z = depth.astype(np.float32)
