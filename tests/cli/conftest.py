@@ -1,9 +1,13 @@
 """The commands, called in this process and in a folder of their own."""
 
+import csv
+import io
+import json
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,6 +33,17 @@ class Ran:
 
 
 Cli = Callable[..., Ran]
+
+
+def report(folder: Path | str) -> dict[str, Any]:
+    """report.json as plain data."""
+    document: dict[str, Any] = json.loads((Path(folder) / "report.json").read_bytes())
+    return document
+
+
+def rows(folder: Path | str) -> list[dict[str, str]]:
+    """frames.csv."""
+    return list(csv.DictReader(io.StringIO((Path(folder) / "frames.csv").read_text())))
 
 
 @pytest.fixture

@@ -11,9 +11,11 @@ import pytest
 from stsem import hostclock
 from stsem.camera import Camera
 from stsem.frame import Frame, Segmentation
+from stsem.geometry.features import Features
 from stsem.replay import calibrate
 from stsem.replay.calibrate import Subject, measure
 from stsem.stages.propagate import Hold
+from stsem.stages.register import Registration
 
 MS = 1_000_000
 COSTS_MS = {"segment": 100, "register": 5, "propagate": 2, "fuse": 7, "decode": 3}
@@ -43,6 +45,11 @@ class Host:
 
     def busy_ns(self) -> int | None:
         return None if self.others is None else self.own_ns + self.others_ns + round(self.others * self.now_ns)
+
+
+def no_features(register: object, frame: Frame, keyframe: object, keyframe_index: object) -> Registration:
+    """A register stage that finds nothing, at no expense."""
+    return Registration(Features(np.empty((0, 2), np.float32), np.empty((0, 32), np.uint8), *frame.size), None)
 
 
 class FakeNetwork:
@@ -75,7 +82,7 @@ def host(monkeypatch: pytest.MonkeyPatch) -> Host:
         return run
 
     monkeypatch.setattr(calibrate, "Inferencer", SlowInferencer)
-    monkeypatch.setattr(calibrate.Register, "__call__", slowed("register", calibrate.Register.__call__))
+    monkeypatch.setattr(calibrate.Register, "__call__", slowed("register", no_features))
     monkeypatch.setattr(calibrate.Fuse, "__call__", slowed("fuse", calibrate.Fuse.__call__))
     return machine
 
