@@ -4,10 +4,14 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from stsem.sim.profile import CostProfile
 
 from .made_up_walk import write_walk
+
+settings.register_profile("stsem", derandomize=True, deadline=None)
+settings.load_profile("stsem")  # the same examples everywhere, however busy the machine is
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -1,6 +1,6 @@
 """Scores of `--model oracle --keyframes every:5 --propagation hold --clock offline`, without a line of stsem.
 
-    python tests/acceptance/independent_scores.py LOG.mcap
+python tests/acceptance/independent_scores.py LOG.mcap
 """
 
 import json
