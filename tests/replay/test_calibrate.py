@@ -126,10 +126,19 @@ def test_every_stage_is_measured(host: Host) -> None:
         "segment@1": {100 * MS}, "segment@2": {50 * MS}, "register@1": {5 * MS}, "propagate@1": {2 * MS},
         "fuse@1": {7 * MS}, "decode@1": {3 * MS},
     }  # fmt: skip
-    assert all(len(samples) >= calibrate.SAMPLES for samples in profile.samples_ns.values())
+    assert all(len(samples) == calibrate.SAMPLES for samples in profile.samples_ns.values())
     assert not profile.disturbed
     assert profile.made_for["network"] == "fake"
     assert profile.made_for["image"] == "32x24"
+
+
+def test_quick_stages_are_thinned_fairly() -> None:
+    """The samples kept are spread like all of them, whatever their number."""
+    assert calibrate._thinned(list(range(1000, 0, -1)), 4) == (126, 376, 626, 876)
+    assert calibrate._thinned([3, 1, 2], 12) == (1, 2, 3)
+    for count in range(1, 40):
+        kept = calibrate._thinned(list(range(count)), 12)
+        assert len(set(kept)) == min(count, 12)
 
 
 def test_what_is_not_needed_is_not_measured(host: Host) -> None:
