@@ -1,5 +1,6 @@
 """The walk: through free space and doors, at the pace that was asked for."""
 
+from functools import cache
 from itertools import pairwise
 from typing import cast
 
@@ -17,6 +18,9 @@ from stsem.synth.path import STEP_S, area_of, pose_at, profile, walk
 from stsem.synth.scene import Scene
 
 ELBOW_M = 0.3
+
+
+furnished = cache(build_office)
 
 
 def bare(layout: int) -> Office:
@@ -58,7 +62,7 @@ def in_a_doorway(plan: FloorPlan, x: float, y: float) -> bool:
 @pytest.mark.parametrize("layout", [12, 7003])
 def test_the_walk_keeps_clear_of_furniture(layout: int) -> None:
     """Tours of every room in both manners of walking."""
-    office = build_office(layout)
+    office = furnished(layout)
     boxes = np.array(office.furnishing.obstacles)
     for seed, speed in enumerate(("steady", "varying")):
         places = states_of(office, layout, seed, 120, speed)[:, None, :2]
@@ -119,7 +123,7 @@ def test_a_varying_walk_pauses_and_hurries() -> None:
 @pytest.mark.parametrize(("speed", "limit"), [("steady", 45.0), ("varying", 90.0)])
 def test_it_turns_no_faster_than_asked(speed: str, limit: float) -> None:
     """Yaw up to the limit (and it gets there), pitch up to half of it, looking neither at its feet nor at the sky."""
-    office = build_office(12)
+    office = furnished(12)
     states = states_of(office, 12, 5, 120, speed)
     yaw, pitch = (np.degrees(np.abs(np.diff(states[:, k])).max() / STEP_S) for k in (3, 4))
     assert 0.8 * limit < yaw <= limit + 1e-6
