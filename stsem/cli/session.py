@@ -64,8 +64,7 @@ def _folders(recordings: Sequence[tuple[Path, ...]], out: Path | None) -> list[P
 
 def _replay_one(paths: tuple[Path, ...], config: RunConfig, out: Path | None) -> int:
     began = hostclock.wall_ns()
-    if out is not None:
-        check_target(out)
+    check_target(out or REPORTS / paths[0].stem / "report")
     with progress(f"Reading {paths[0].name}") as step:
         log = open_log(
             paths,

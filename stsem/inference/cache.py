@@ -134,19 +134,19 @@ def usage(root: Path) -> CacheUsage:
 
 
 def clear(root: Path) -> CacheUsage:
-    """Remove the cached network outputs below `root`; returns what was removed. Cost profiles stay.
+    """Remove the network outputs and cost profiles below `root`, nothing else; returns what was removed.
 
     Raises:
         OutputError: something there cannot be removed.
     """
-    outputs = root / "outputs"
-    removed = usage(outputs)
-    try:
-        if outputs.is_dir():
-            shutil.rmtree(outputs)
-    except OSError as err:
-        raise _unwritable(outputs, err) from err
-    return removed
+    folders = [folder for folder in (root / "outputs", root / "costs") if folder.is_dir()]
+    found = [usage(folder) for folder in folders]
+    for folder in folders:
+        try:
+            shutil.rmtree(folder)
+        except OSError as err:
+            raise _unwritable(folder, err) from err
+    return CacheUsage(root, sum(one.files for one in found), sum(one.bytes for one in found))
 
 
 def _write_atomically(path: Path, data: bytes) -> None:

@@ -74,7 +74,8 @@ def check_target(folder: Path) -> None:
         raise OutputError(f"The output {folder} is a file, a folder was expected; choose another place with --out.")
     if folder.is_dir() and any(folder.iterdir()) and not (folder / "report.json").is_file():
         raise OutputError(f"The folder {folder} holds files that are no report; choose another place with --out.")
-    with _aside(folder) as aside:
+    nearest = next(place for place in folder.absolute().parents if place.exists())
+    with _aside(nearest / folder.name) as aside:  # tried where a folder is already: nothing is left if the run fails
         aside.rmdir()
 
 

@@ -168,13 +168,19 @@ def test_unwritable_output(replay: Cli, home: Path, tiny_log: Path, target: str)
     assert (home / "file").read_text() == "mine"
 
 
-def test_default_output_is_a_file(replay: Cli, home: Path, tiny_log: Path) -> None:
-    """`reports` may be a file, too."""
-    (home / "reports").write_text("mine")
+@pytest.mark.parametrize("place", ["reports", "reports/tiny"])
+def test_default_output_is_a_file(
+    replay: Cli, home: Path, tiny_log: Path, place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`reports` may be a file, too: said before the log is even opened."""
+    monkeypatch.delattr("stsem.cli.session.open_log")
+    (home / place).parent.mkdir(exist_ok=True)
+    (home / place).write_text("mine")
     ran = replay(tiny_log, "--model", "oracle")
     assert ran.code == 1
-    assert "reports" in ran.sentence
-    assert (home / "reports").read_text() == "mine"
+    assert place in ran.sentence
+    assert "--out" in ran.sentence
+    assert (home / place).read_text() == "mine"
 
 
 def test_folder_of_others(replay: Cli, home: Path, tiny_log: Path) -> None:

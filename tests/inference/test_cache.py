@@ -124,16 +124,18 @@ def test_the_checksum_sees_both_frames() -> None:
 
 
 def test_usage_and_clear(inferencer: _Counting, tmp_path: Path) -> None:
-    """Everything is counted; only network outputs are removed."""
+    """Everything is counted; network outputs and cost profiles are removed, files of others stay."""
     root = tmp_path / "c"
     assert usage(root).files == 0
     cached = CachedInferencer(inferencer, OutputCache(root, "log", inferencer.identity))
     for index in range(3):
         cached.infer(_frame(index))
-    (root / "profile.json").write_text("{}")
-    assert usage(root).files == 5  # three entries, about.json, the profile
+    (root / "costs").mkdir()
+    (root / "costs" / "profile.json").write_text("{}")
+    (root / "mine.txt").write_text("mine")
+    assert usage(root).files == 6  # three entries, about.json, the profile, and a file of somebody else
     removed = clear(root)
-    assert (removed.files, usage(root).files, usage(root).bytes) == (4, 1, 2)
+    assert (removed.files, usage(root).files, usage(root).bytes) == (5, 1, 4)
     assert clear(root).files == 0
 
 
