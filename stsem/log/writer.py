@@ -56,6 +56,8 @@ class LogWriter:
     """
 
     def __init__(self, path: Path, classes: ClassSet) -> None:
+        if path.is_dir():
+            raise OutputError(f"The log {path} cannot be written: it is a folder; give the name of a file in it.")
         self._path, self._aside, self._classes = path, path.with_name(f".{path.name}.{os.getpid()}"), classes
         self._counts = dict.fromkeys(_SCHEMAS, 0)
         self._last_ns = 0
@@ -117,8 +119,6 @@ class LogWriter:
         self._write("/pose", stamp_ns, log_ns, fox.PoseInFrame(timestamp=_stamp(stamp_ns), frame_id=WORLD, pose=pose))
 
     def _open(self) -> IO[bytes]:
-        if self._path.is_dir():
-            raise OutputError(f"The log {self._path} cannot be written: it is a folder; give the name of a file in it.")
         try:
             return self._aside.open("wb")
         except OSError as err:

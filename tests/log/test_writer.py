@@ -188,7 +188,7 @@ def test_a_message_out_of_order_is_an_error_of_the_caller(tmp_path: Path) -> Non
         assert len(read.plans) == 1
 
 
-@pytest.mark.parametrize("place", ["missing/log.mcap", "folder", "file/log.mcap"])
+@pytest.mark.parametrize("place", ["missing/log.mcap", "folder", "folder/..", "file/log.mcap"])
 def test_a_place_that_cannot_be_written_is_a_sentence(tmp_path: Path, place: str) -> None:
     """No folder, a folder in its place, or a file where a folder should be: told before anything is written."""
     (tmp_path / "folder").mkdir()
