@@ -2,6 +2,7 @@
 
 import functools
 import os
+import signal
 import sys
 from collections.abc import Callable
 from typing import NoReturn, ParamSpec, cast
@@ -13,6 +14,8 @@ from stsem.errors import EXIT_ERROR, EXIT_FINE, EXIT_USAGE, StsemError
 P = ParamSpec("P")
 _Misused = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
 """The parent of every complaint about arguments; typer gives it no public name."""
+
+_INTERRUPTED = "Interrupted; no half-written report is left behind."
 
 
 def launch(app: typer.Typer) -> NoReturn:
@@ -43,12 +46,19 @@ def verb(function: Callable[P, int | None]) -> Callable[P, None]:
 def _run(body: Callable[[], int | None]) -> int:
     if os.environ.get("STSEM_DEBUG") == "1":
         return body() or EXIT_FINE
+    interrupts: list[int] = []
+
+    def interrupt(number: int, frame: object) -> NoReturn:
+        interrupts.append(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt)
     try:
         return body() or EXIT_FINE
     except StsemError as err:
         return _say(str(err), err.exit_code)
     except KeyboardInterrupt:
-        return _say("Interrupted; no half-written report is left behind.", EXIT_ERROR)
+        return _say(_INTERRUPTED, EXIT_ERROR)
     except BrokenPipeError:
         sys.stderr.close()
         return EXIT_ERROR
@@ -57,8 +67,12 @@ def _run(body: Callable[[], int | None]) -> int:
     except MemoryError:
         return _say("The memory of this machine is used up; close other programs or take a smaller window.", EXIT_ERROR)
     except Exception as err:  # noqa: BLE001 - the last line of defence: a bug is told in one sentence, too
+        if interrupts:  # a library that was being loaded turned Ctrl-C into an error of its own
+            return _say(_INTERRUPTED, EXIT_ERROR)
         what = f"{type(err).__name__}: {err}".replace("\n", " ")
         return _say(f"This is a defect of stsem, please report it with STSEM_DEBUG=1: {what}.", EXIT_ERROR)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _say(text: str, code: int) -> int:
