@@ -53,6 +53,7 @@ def write_walk(
     depth: Callable[[int], bool] | None = always,
     poses: bool = True,
     broken: frozenset[int] = frozenset(),
+    broken_labels: frozenset[int] = frozenset(),
     names: Mapping[int, str] | None = NAMES,
     distortion: tuple[float, ...] = (),
     metadata: Mapping[str, Mapping[str, str]] | None = None,
@@ -65,7 +66,7 @@ def write_walk(
         size: (width, height) of colour, depth and labels.
         truth, depth: which frames have labels and depth; None for no such channel.
         poses: whether the log has poses.
-        broken: frames whose image holds too few bytes.
+        broken, broken_labels: frames whose image, or label image, holds too few bytes.
         names: class table; None for none.
         distortion: of the calibration.
         metadata: further records.
@@ -91,7 +92,11 @@ def write_walk(
                 metres[:4] = 0
                 log.add("/camera/depth", _image(stamp, metres, "16UC1", 2 * width), stamp + DELAYS_NS["depth"])
             if truth is not None and truth(i):
-                log.add("/gt/labels", _image(stamp, labels[window], "mono8", width), stamp + DELAYS_NS["labels"])
+                log.add(
+                    "/gt/labels",
+                    _image(stamp, labels[window], "mono8", width, cut=i in broken_labels),
+                    stamp + DELAYS_NS["labels"],
+                )
         log.writer.finish()
     return path
 

@@ -1,7 +1,7 @@
 """From what one mode did to its part of the report."""
 
-from collections import Counter
-from collections.abc import Mapping
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from stsem.document.accuracy import Coverage, Loss
@@ -20,7 +20,7 @@ from stsem.replay.costing import Costing
 from stsem.replay.engine import Replayed
 from stsem.replay.lanes import ModeRun
 from stsem.replay.record import Record
-from stsem.result import Outcome
+from stsem.result import Outcome, Span
 
 NO_CLOCK = "--clock offline"
 NO_OFFLINE = "--no-offline"
@@ -132,10 +132,22 @@ def _timing(context: Context, run: ModeRun) -> tuple[Latency | None, Throughput 
 
 def _distinct_samples(context: Context, run: ModeRun) -> int | None:
     """Of the slowest stage's profile: what bounds the percentiles (DESIGN 5)."""
-    profile = None if context.costing is None else context.costing.profile
-    if profile is None:
+    costing = context.costing
+    if costing is None or costing.sha256 is None:
         return None
+    profile = costing.profile
+    if profile is None:
+        return _distinct_durations(run.spans)
     return profile.distinct_samples_of_slowest({f"{span.stage}@{len(span.cores)}" for span in run.spans})
+
+
+def _distinct_durations(spans: Iterable[Span]) -> int:
+    """Of the stage with the largest median in a trace that is replayed: it may have been drawn from a small profile."""
+    durations: dict[str, list[int]] = defaultdict(list)
+    for span in spans:
+        durations[span.stage].append(span.end_ns - span.start_ns)
+    slowest = max((sorted(found) for found in durations.values()), key=lambda found: found[len(found) // 2], default=[])
+    return len(set(slowest))
 
 
 def _disabled(context: Context, run: ModeRun, record: Record) -> dict[str, int]:

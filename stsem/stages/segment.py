@@ -63,8 +63,8 @@ class OracleSegmenter:
     truth: Callable[[int], Labels | None]
 
     def can_segment(self, index: int) -> bool:
-        """Only frames with truth."""
-        return self.has_truth(index)
+        """Only frames with truth that can be decoded."""
+        return self.has_truth(index) and self.truth(index) is not None
 
     def segment(self, frame: Frame) -> Segmentation:
         """The truth, resized to the image by nearest neighbour where their sizes differ."""

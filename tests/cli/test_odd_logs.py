@@ -143,3 +143,18 @@ def test_missing_depth_disables_the_map_for_that_frame(replay: Cli, home: Path) 
     (run,) = report("r")["runs"]
     assert run["outcomes"]["incomplete"] == 0
     assert run["stages_disabled"] == {"fuse": 3}
+
+
+def test_a_broken_label_image_is_no_truth(replay: Cli, home: Path) -> None:
+    """The oracle's choice moves on; the frame is not judged, and the log counts as damaged."""
+    path = write_walk(home / "labels.mcap", frames=8, broken_labels=frozenset({0, 4}))
+    arguments = ("--model", "oracle", "--keyframes", "every:4", "--clock", "offline", "--out", "r")
+    assert replay(path, *arguments).code == 3
+    document = report("r")
+    assert document["input"]["logs"][0]["damage"]["counts"] == {"undecodable": {"/gt/labels": 2}}
+    per_frame, keyframe = document["runs"]
+    assert per_frame["outcomes"]["no_source"] == 2
+    assert per_frame["offline"]["n"] == 6
+    assert keyframe["keyframes"] == [1, 5]
+    assert keyframe["keyframes_moved"] == 1
+    assert next(row["outcome"] for row in rows("r") if row["mode"] == "keyframe") == "no_source"

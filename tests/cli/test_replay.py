@@ -67,6 +67,10 @@ def test_a_trace_gives_its_timing_again(replay: Cli, home: Path, tiny_log: Path)
     assert replay(tiny_log, "--model", "oracle", "--costs", "first/trace.json", "--out", "second").code == 0
     assert (home / "first" / "trace.json").read_bytes() == (home / "second" / "trace.json").read_bytes()
     assert (home / "first" / "frames.csv").read_bytes() == (home / "second" / "frames.csv").read_bytes()
+    medians = [
+        [run["latency_ms"]["from_arrival"]["p50"] for run in report(name)["runs"]] for name in ("first", "second")
+    ]
+    assert medians == [[None, None], [None, None]]  # four samples make no median, replayed from a trace or not
     ran = replay(tiny_log, "--model", "oracle", "--costs", "first/trace.json", "--cores", "1")
     assert (ran.code, "segment@1" in ran.sentence) == (1, True)
     ran = replay(tiny_log, "--model", "oracle", "--costs", "first/trace.json", "--count-decode")
