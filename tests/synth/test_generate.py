@@ -6,7 +6,6 @@ import subprocess
 import sys
 import weakref
 from collections.abc import Generator
-from itertools import islice
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
@@ -18,6 +17,7 @@ from stsem.errors import MissingExtraError, OutputError, UsageError
 from stsem.log.log import open_log
 from stsem.synth import generate
 from stsem.synth.generate import RenderedFrame, office_camera, render_frames, render_log
+from stsem.synth.scene import Scene
 from stsem.synth.vocabulary import OFFICE
 
 SHORT: dict[str, Any] = {
@@ -40,45 +40,50 @@ def made_up_frames(count: int, period_ns: int = 10**8) -> Generator[RenderedFram
 
 
 @pytest.mark.render
-def test_other_processes_and_thread_settings_write_the_same_bytes(rendered: Path, tmp_path: Path) -> None:
+def test_other_processes_and_thread_settings_write_the_same_bytes(rendered: Any, tmp_path: Path) -> None:
     """One thread instead of as many as there are cores, and another order of Python's sets."""
     script = (
         "from pathlib import Path; import sys; from stsem.synth.generate import render_log; "
-        f"render_log(Path(sys.argv[1]), label_every=2, **{SHORT!r})"
+        f"render_log(Path(sys.argv[1]), label_every=2, **{rendered.asked!r})"
     )
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM", "PYTHONHASHSEED")
     path, settings = tmp_path / "again.mcap", os.environ | dict.fromkeys(names, "1")
     subprocess.run([sys.executable, "-c", script, str(path)], env=settings, check=True, timeout=300)
-    assert sha256(path) == sha256(rendered)
+    assert sha256(path) == sha256(rendered.path)
 
 
 @pytest.mark.render
-@pytest.mark.parametrize("change", [{"seed": 4}, {"layout": 12}])
-def test_another_seed_or_layout_is_another_log(rendered: Path, change: dict[str, int]) -> None:
+def test_another_layout_is_another_log(rendered: Any) -> None:
     """Already the first frame differs, in colour, labels and pose."""
-    frame = next(render_frames(**SHORT | change))
-    with open_log([rendered]) as log:
-        first = log.frame(0, depth=True, previous=False)
-        truth = log.truth(0)
-    assert first.T_WC is not None
-    assert truth is not None
-    assert np.abs(first.image.astype(int) - frame.image).mean() > 5
-    assert (truth != frame.labels).mean() > 0.05
-    assert np.abs(first.T_WC - frame.T_WC).max() > 0.05
+    first, other = rendered.frames[0], next(render_frames(**SHORT | {"layout": 12}))
+    assert np.abs(first.image.astype(int) - other.image).mean() > 5
+    assert (first.labels != other.labels).mean() > 0.05
+    assert np.abs(first.T_WC - other.T_WC).max() > 0.05
 
 
 @pytest.mark.render
-def test_the_log_has_what_was_rendered(rendered: Path) -> None:
+def test_another_seed_is_another_walk_and_other_noise(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through the same building; it may start before the same door, of three."""
+    monkeypatch.setattr(generate, "Scene", lambda *_: scene)
+    frames = [next(render_frames(**SHORT | {"seed": seed, "noise": "kinect"})) for seed in (1, 1, 2, 3, 4)]
+    np.testing.assert_array_equal(frames[0].image, frames[1].image)
+    np.testing.assert_array_equal(frames[0].depth, frames[1].depth)
+    assert len({tuple(frame.T_WC[:2, 3].tolist()) for frame in frames}) > 1
+    assert len({frame.depth.tobytes() for frame in frames}) == 4
+
+
+@pytest.mark.render
+def test_the_log_has_what_was_rendered(rendered: Any) -> None:
     """Depth to half a millimetre, poses to 1e-9, labels exactly, colour as JPEG keeps it, truth for every second."""
-    with open_log([rendered]) as log:
+    with open_log([rendered.path]) as log:
         assert not log.info.damage.lossy
         assert log.info.warnings == ()
         assert log.classes == OFFICE
         assert log.camera is not None
         np.testing.assert_array_equal(log.camera.K, office_camera(64, 48).K)
         assert not log.camera.is_distorted
-        assert len(log.plans) == 6
-        for index, frame in enumerate(islice(render_frames(**SHORT), 3)):
+        assert len(log.plans) == len(rendered.frames) == 6
+        for index, frame in enumerate(rendered.frames):
             read, truth = log.frame(index, depth=True, previous=False), log.truth(index)
             assert read.stamp_ns == frame.stamp_ns
             assert read.depth is not None
