@@ -15,7 +15,6 @@ from foxglove import messages as fox
 from mcap.well_known import MessageEncoding
 from mcap.writer import CompressionType, Writer
 
-from stsem import __version__
 from stsem.camera import Camera
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.errors import OutputError
@@ -66,7 +65,7 @@ class LogWriter:
             self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
         )
         with self._whole_or_nothing():
-            self._writer.start("", f"stsem {__version__}")
+            self._writer.start("", "stsem")
             names = {str(i): name for i, name in enumerate(classes.names)}
             self._writer.add_metadata("stsem.classes", names)
             self._channels = {topic: self._register(topic, schema) for topic, schema in _SCHEMAS.items()}

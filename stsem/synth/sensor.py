@@ -43,10 +43,9 @@ def millimetres(depth: Depth) -> npt.NDArray[np.uint16]:
 def kinect(depth: Depth, focal_px: float, rng: np.random.Generator) -> Depth:
     """Depth (H, W) as a structured-light camera would measure it, metres, NaN unknown.
 
-    Axial noise sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 (Nguyen, Izadi, Lovell 2012, equation 3), disparity in eighths of
-    a pixel, and holes: out of range, where the projector, 7.5 cm to the side, is hidden, and where depth changes faster
-    than at a grazing surface, which includes the two pixels at a high edge. At low edges, of 4 % of the depth up to
-    there, depths are mixed.
+    Axial noise sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 (Nguyen, Izadi, Lovell 2012, equation 3), mixed depths at edges
+    ("flying pixels"), disparity in eighths of a pixel, and holes: out of range, at grazing incidence, and where the
+    projector, 7.5 cm to the side, is hidden.
     """
     height, width = depth.shape
     z = depth.astype(np.float32)
@@ -75,10 +74,20 @@ def _projector_hidden(z: F32, focal_px: float) -> npt.NDArray[np.bool_]:
 
 
 def _grazing(z: F32, focal_px: float) -> npt.NDArray[np.bool_]:
-    """Pixels whose surface is seen at less than about six degrees, from the slope of depth between neighbours."""
-    slope_x = np.gradient(z, axis=1) * focal_px / z
-    slope_y = np.gradient(z, axis=0) * focal_px / z
+    """Pixels whose surface is seen at less than about six degrees.
+
+    The slope is the smaller one of the two towards the neighbours, so that an edge does not count as a slope.
+    """
+    slope_x, slope_y = (_slope(z, axis) * focal_px / z for axis in (1, 0))
     return np.asarray(1 / np.sqrt(1 + slope_x**2 + slope_y**2) < _GRAZING)
+
+
+def _slope(z: F32, axis: int) -> F32:
+    """(H, W) smaller of the two differences to the neighbours along `axis`, metres a pixel; 0 at the border."""
+    step = np.abs(np.diff(z, axis=axis))
+    pad = ((1, 0), (0, 0)) if axis == 0 else ((0, 0), (1, 0))
+    back = ((0, 1), (0, 0)) if axis == 0 else ((0, 0), (0, 1))
+    return np.asarray(np.minimum(np.pad(step, pad), np.pad(step, back)), np.float32)
 
 
 def _flying(z: F32, rng: np.random.Generator) -> F32:
