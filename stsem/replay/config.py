@@ -31,6 +31,14 @@ Where: dict[str, JsonValue] = {"where": True}
 """Marks fields that say where things come from or go to, or how they are shown: they are not part of the result."""
 
 
+def _sha256(path: Path) -> str:
+    """Of the file's bytes; "" when it cannot be read, which its user will say."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
 class RunConfig(BaseModel):
     """Everything that can be configured; every key is also a flag, a TOML key and an environment variable.
 
@@ -145,10 +153,13 @@ class RunConfig(BaseModel):
         return self.model == "oracle"
 
     def reported(self) -> dict[str, Any]:
-        """The part of the configuration that results depend on, JSON-able; files by name only."""
+        """The part of the configuration that results depend on, JSON-able; class files by their sha256."""
         where = {name for name, field in type(self).model_fields.items() if field.json_schema_extra == Where}
         values: dict[str, Any] = self.model_dump(mode="json", exclude=where)
         values["model"] = Path(self.model).name
+        values |= {
+            name: _sha256(path) for name in ("classes", "class_map") if (path := getattr(self, name)) is not None
+        }
         values["costs"] = self.costs if self.costs in ("auto", "measured") else "file"
         return values
 

@@ -69,8 +69,9 @@ def costing(log: Log, config: RunConfig, model: Model, *, fused: bool, say: Call
         raise CostError(f"The costs {path} cannot be read: {err.strerror or err}; give a profile or a trace.") from err
     if is_trace(data):
         durations, sha256 = read_durations(path)
-        return Costing(path.name, lambda mode: TraceCosts(durations, mode.name, sha256), sha256, None)
-    return _of_profile(path.name, load_profile(path), log, config)
+        return Costing("trace of an earlier run", lambda mode: TraceCosts(durations, mode.name, sha256), sha256, None)
+    profile = load_profile(path)
+    return _of_profile(f"profile of {profile.machine}", profile, log, config)
 
 
 def _of_profile(name: str, profile: CostProfile, log: Log, config: RunConfig) -> Costing:

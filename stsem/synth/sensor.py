@@ -83,11 +83,11 @@ def _grazing(z: F32, focal_px: float) -> npt.NDArray[np.bool_]:
 
 
 def _slope(z: F32, axis: int) -> F32:
-    """(H, W) smaller of the two differences to the neighbours along `axis`, metres a pixel; 0 at the border."""
+    """(H, W) smaller of the two differences to the neighbours along `axis`, metres a pixel."""
     step = np.abs(np.diff(z, axis=axis))
     pad = ((1, 0), (0, 0)) if axis == 0 else ((0, 0), (1, 0))
     back = ((0, 1), (0, 0)) if axis == 0 else ((0, 0), (0, 1))
-    return np.asarray(np.minimum(np.pad(step, pad), np.pad(step, back)), np.float32)
+    return np.asarray(np.minimum(np.pad(step, pad, mode="edge"), np.pad(step, back, mode="edge")), np.float32)
 
 
 def _flying(z: F32, rng: np.random.Generator) -> F32:

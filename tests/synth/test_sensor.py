@@ -61,7 +61,7 @@ def test_the_projectors_shadow_lies_to_the_right_of_a_near_body() -> None:
 
 
 def test_depths_are_mixed_at_edges_only() -> None:
-    """At the visible edge of a body 2 m before the wall about a third of the pixels lie in between, and none elsewhere."""
+    """At the visible edge of a body 2 m before a wall a third of the pixels lie in between, and none elsewhere."""
     measured = np.stack([kinect(step_edge(), FOCAL_PX, generator(k, "test")) for k in range(8)])
     floating = ((measured > 1.1) & (measured < 2.8)).mean(axis=(0, 1))
     assert 0.2 < floating[60] < 0.4
