@@ -49,8 +49,7 @@ def export(
     else:
         network = build(architecture or "", classes).eval()
     published = publish(network, described, out)
-    print(
-        f"Network: {out} ({out.stat().st_size / 1e6:.1f} MB, {classes} classes, {published.size[0]}x{published.size[1]})"
-    )
+    width, height = published.size
+    print(f"Network: {out} ({out.stat().st_size / 1e6:.1f} MB, {classes} classes, {width}x{height})")
     print(f"Replay:  stsem-replay LOG --model {out}")
     return 0

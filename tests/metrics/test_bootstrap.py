@@ -137,7 +137,7 @@ def test_pairing_is_what_makes_differences_sharp() -> None:
 
 
 def test_agrees_with_scipy_on_a_plain_mean() -> None:
-    """Frames of equal size without autocorrelation: the score is a mean, and scipy's BCa interval says nearly the same."""
+    """Equal frames without autocorrelation: the score is a mean, and scipy's BCa interval says nearly the same."""
     samples = one_class(np.random.default_rng(5).beta(8, 2, 300))
     ours = interval(samples, "pixel_accuracy", seed=1)
     blocks = shared_blocks([samples], "pixel_accuracy")
