@@ -8,7 +8,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Protocol, Self
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from foxglove import messages as fox
@@ -19,12 +18,11 @@ from stsem.camera import Camera
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.errors import OutputError
 from stsem.frame import Image
-from stsem.pose import Pose, to_quaternion
+from stsem.log import encode
+from stsem.pose import Pose
 
 WORLD, OPTICAL = "world", "camera_optical"
 _CHUNK_BYTES = 2 << 20
-_JPEG_QUALITY = 85
-_SECOND_NS = 10**9
 
 
 class _Encodable(Protocol):
@@ -85,26 +83,23 @@ class LogWriter:
 
     def color(self, stamp_ns: int, log_ns: int, image: Image) -> None:
         """A colour image (H, W, 3) uint8 RGB, as JPEG."""
-        settings = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-        _, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), settings)
-        message = fox.CompressedImage(
-            timestamp=_stamp(stamp_ns), frame_id=OPTICAL, format="jpeg", data=data.tobytes()
-        )  # fmt: skip
-        self._write("/camera/color", stamp_ns, log_ns, message)
+        self._write("/camera/color", stamp_ns, log_ns, encode.jpeg_image(image, stamp_ns, OPTICAL))
 
     def depth(self, stamp_ns: int, log_ns: int, millimetres: npt.NDArray[np.uint16]) -> None:
         """Depth (H, W) uint16 along z, 0 unknown, pixel for pixel that of the colour image."""
-        self._write("/camera/depth", stamp_ns, log_ns, _raw(stamp_ns, "16UC1", millimetres.astype("<u2")))
+        self._write(
+            "/camera/depth", stamp_ns, log_ns, encode.raw_image(millimetres.astype("<u2"), "16UC1", stamp_ns, OPTICAL)
+        )
 
     def labels(self, stamp_ns: int, log_ns: int, labels: Labels) -> None:
         """Truth (H, W) uint8 class ids, 255 ignored."""
-        self._write("/gt/labels", stamp_ns, log_ns, _raw(stamp_ns, "mono8", labels))
+        self._write("/gt/labels", stamp_ns, log_ns, encode.raw_image(labels, "mono8", stamp_ns, OPTICAL))
 
     def calibration(self, stamp_ns: int, log_ns: int, camera: Camera) -> None:
         """Intrinsics of the colour and the depth image."""
         K = camera.K.ravel().tolist()
         message = fox.CameraCalibration(
-            timestamp=_stamp(stamp_ns), frame_id=OPTICAL, width=camera.width, height=camera.height,
+            timestamp=encode.timestamp(stamp_ns), frame_id=OPTICAL, width=camera.width, height=camera.height,
             distortion_model="plumb_bob", D=[0.0] * 5, K=K, R=np.eye(3).ravel().tolist(),
             P=np.hstack([camera.K, np.zeros((3, 1))]).ravel().tolist(),
         )  # fmt: skip
@@ -112,10 +107,9 @@ class LogWriter:
 
     def pose(self, stamp_ns: int, log_ns: int, T_WC: Pose) -> None:
         """Pose of the optical frame in the world, metres."""
-        x, y, z = T_WC[:3, 3].tolist()
-        qx, qy, qz, qw = to_quaternion(T_WC).tolist()
-        pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=z), orientation=fox.Quaternion(x=qx, y=qy, z=qz, w=qw))
-        self._write("/pose", stamp_ns, log_ns, fox.PoseInFrame(timestamp=_stamp(stamp_ns), frame_id=WORLD, pose=pose))
+        pose = fox.Pose(position=encode.vector(T_WC), orientation=encode.quaternion(T_WC))
+        stamp = encode.timestamp(stamp_ns)
+        self._write("/pose", stamp_ns, log_ns, fox.PoseInFrame(timestamp=stamp, frame_id=WORLD, pose=pose))
 
     def _open(self) -> IO[bytes]:
         try:
@@ -162,15 +156,3 @@ class LogWriter:
         colours = self._classes.palette()[: len(self._classes)].tolist()
         table = {"names": list(self._classes.names), "colours": colours, "ignore_id": NO_LABEL}
         return (json.dumps(table, indent=1) + "\n").encode()
-
-
-def _stamp(stamp_ns: int) -> fox.Timestamp:
-    return fox.Timestamp(*divmod(stamp_ns, _SECOND_NS))
-
-
-def _raw(stamp_ns: int, encoding: str, pixels: npt.NDArray[Any]) -> fox.RawImage:
-    height, width = pixels.shape
-    return fox.RawImage(
-        timestamp=_stamp(stamp_ns), frame_id=OPTICAL, width=width, height=height, encoding=encoding,
-        step=width * pixels.itemsize, data=pixels.tobytes(),
-    )  # fmt: skip

@@ -14,11 +14,10 @@ from mcap.writer import CompressionType, Writer
 from stsem import __version__
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.frame import Frame, Image
-from stsem.pose import to_quaternion
+from stsem.log import encode
 from stsem.result import FrameResult
 
 _OPAQUE = 0.55
-_JPEG_QUALITY = 85
 _WORLD, _CAMERA = "world", "camera_optical"
 _ANSWER_SCHEMA = {
     "type": "object",
@@ -57,8 +56,10 @@ class AnnotatedLog:
             return
         labels, stamp = _at_size(result.labels, frame.size), frame.stamp_ns
         colours = self._palette[labels]
-        self._message(f"/stsem/{mode}/overlay", stamp, _jpeg(_blend(frame.image, colours, labels), stamp))
-        self._message(f"/stsem/{mode}/labels", stamp, _raw_rgb(colours, stamp))
+        self._message(
+            f"/stsem/{mode}/overlay", stamp, encode.jpeg_image(_blend(frame.image, colours, labels), stamp, _CAMERA)
+        )
+        self._message(f"/stsem/{mode}/labels", stamp, encode.raw_image(colours, "rgb8", stamp, _CAMERA))
         self._json(f"/stsem/{mode}/answer", stamp, _facts(result))
         if frame.T_WC is not None and frame.index not in self._posed:
             self._posed.add(frame.index)
@@ -74,7 +75,7 @@ class AnnotatedLog:
         bytes_ = [fox.PackedElementField(name=n, offset=12 + i, type=fox.PackedElementFieldNumericType.Uint8)
                   for i, n in enumerate(("red", "green", "blue", "alpha", "label"))]  # fmt: skip
         cloud = fox.PointCloud(
-            timestamp=_stamp(stamp_ns), frame_id=_WORLD, pose=_identity(), point_stride=packed.itemsize,
+            timestamp=encode.timestamp(stamp_ns), frame_id=_WORLD, pose=_identity(), point_stride=packed.itemsize,
             fields=floats + bytes_, data=packed.tobytes(),
         )  # fmt: skip
         self._message("/stsem/map", stamp_ns, cloud)
@@ -120,32 +121,12 @@ def _at_size(labels: Labels, size: tuple[int, int]) -> Labels:
     return np.asarray(cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST_EXACT), np.uint8)
 
 
-def _jpeg(image: Image, stamp_ns: int) -> fox.CompressedImage:
-    settings = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-    _, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), settings)
-    return fox.CompressedImage(timestamp=_stamp(stamp_ns), frame_id=_CAMERA, format="jpeg", data=data.tobytes())
-
-
-def _raw_rgb(image: Image, stamp_ns: int) -> fox.RawImage:
-    height, width = image.shape[:2]
-    return fox.RawImage(
-        timestamp=_stamp(stamp_ns), frame_id=_CAMERA, width=width, height=height, encoding="rgb8", step=3 * width,
-        data=image.tobytes(),
-    )  # fmt: skip
-
-
 def _transform(T_WC: npt.NDArray[np.float64], stamp_ns: int) -> fox.FrameTransform:
-    x, y, z = T_WC[:3, 3].tolist()
-    qx, qy, qz, qw = to_quaternion(T_WC).tolist()
     return fox.FrameTransform(
-        timestamp=_stamp(stamp_ns), parent_frame_id=_WORLD, child_frame_id=_CAMERA,
-        translation=fox.Vector3(x=x, y=y, z=z), rotation=fox.Quaternion(x=qx, y=qy, z=qz, w=qw),
+        timestamp=encode.timestamp(stamp_ns), parent_frame_id=_WORLD, child_frame_id=_CAMERA,
+        translation=encode.vector(T_WC), rotation=encode.quaternion(T_WC),
     )  # fmt: skip
 
 
 def _identity() -> fox.Pose:
     return fox.Pose(position=fox.Vector3(x=0, y=0, z=0), orientation=fox.Quaternion(x=0, y=0, z=0, w=1))
-
-
-def _stamp(stamp_ns: int) -> fox.Timestamp:
-    return fox.Timestamp(*divmod(stamp_ns, 10**9))
