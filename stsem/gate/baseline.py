@@ -12,14 +12,13 @@ from stsem.document.part import Count, Number, Part
 from stsem.document.schema import Document, Run, State
 from stsem.document.timing import Outcomes
 from stsem.errors import NothingMeasuredError, UsageError
+from stsem.gate.rules import RULES
 
 ORACLE = "oracle"
 
-GATED = (
-    "offline.miou", "offline.pixel_accuracy", "delivered.miou", "delivered.pixel_accuracy", "streaming.miou",
-    "streaming.pixel_accuracy", "latency_ms.from_arrival.p50", "latency_ms.from_arrival.p95",
-    "latency_ms.from_arrival.max", "throughput.output_hz", "throughput.processed_share", "coverage.scored",
-)  # fmt: skip
+SHOWN = ("latency_ms.from_arrival.p50", "throughput.processed_share")
+"""Paths inside a run that a baseline keeps for whoever reviews it; no rule judges them."""
+KEPT = (*(rule.path for rule in RULES), *SHOWN)
 """Paths inside a run that a baseline keeps."""
 
 WINDOW = ("start", "end")
@@ -99,7 +98,7 @@ def _kept(run: Run) -> BaselineRun:
         clock=run.clock,
         outcomes=run.outcomes,
         keyframes=run.keyframes,
-        metrics={path: _number(run, path) for path in GATED},
+        metrics={path: _number(run, path) for path in KEPT},
     )
 
 

@@ -11,6 +11,7 @@ from stsem.errors import NothingMeasuredError, UsageError
 from stsem.gate.baseline import baseline_bytes, make_baseline, read_baseline
 from stsem.gate.judge import gate
 from stsem.gate.markdown import gate_markdown
+from stsem.gate.rules import RULES
 
 BASE = example(pictures=False).document
 
@@ -72,3 +73,12 @@ def test_markdown_without_checks() -> None:
     assert text.startswith("## stsem gate: Not comparable: ")
     assert "no rule was applied" in text
     assert "|" not in text
+
+
+def test_every_gated_number_is_kept_and_found() -> None:
+    """A rule whose path a baseline lacks, or that leads nowhere in a run, would be a gate that never closes."""
+    run = next(run for run in make_baseline(BASE).runs if run.mode == "keyframe")
+    gated = {rule.path for rule in RULES}
+    assert gated
+    assert gated < set(run.metrics)
+    assert [path for path, value in run.metrics.items() if value is None] == []
