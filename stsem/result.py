@@ -5,6 +5,13 @@ from enum import StrEnum
 
 from stsem.classes import Labels
 
+STAGES = ("decode", "register", "segment", "propagate", "fuse")
+"""Every stage that can hold a core, in pipeline order: among jobs of one frame the earlier stage goes first, and
+tables, columns and pictures follow the same order. `decode` is a job only where `--count-decode` makes it one."""
+
+ANSWER_STAGES = ("decode", "register", "segment", "propagate")
+"""Stages between taking a frame and answering it; `fuse` works beside them. In pipeline order."""
+
 
 class Outcome(StrEnum):
     """How the ANSWER to a frame was made (DESIGN 5); every frame ends in exactly one."""
@@ -29,7 +36,7 @@ class Span:
 
     Args:
         frame: log index of the frame it worked for.
-        stage: `register`, `segment`, `propagate`, `track` or `fuse`.
+        stage: one of `STAGES`; `decode` only where decoding is counted.
         cores: the cores it held, ascending.
         ready_ns: when it could have started.
         start_ns, end_ns: when it held its cores, half-open.
@@ -49,7 +56,7 @@ class FrameResult:
 
     Args:
         index: log index.
-        stamp_ns: simulated capture stamp (offline: the log's stamp minus the first).
+        stamp_ns: simulated capture stamp: time since the first frame's, divided by the rate; the same offline.
         arrival_ns: simulated arrival; None offline, or if it never arrived.
         taken_ns: when the answer path took it; None if it did not, or offline.
         answered_ns: when its labels were finished; None if never, or offline.

@@ -6,10 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from stsem.metrics.durations import Summary, summarise
-from stsem.result import FrameResult, Span
-
-ANSWER_STAGES = ("decode", "register", "select", "segment", "propagate")
-"""Stages on the answer path; `fuse` works beside it, `track` too unless the propagation needs its pose."""
+from stsem.result import ANSWER_STAGES, FrameResult, Span
 
 
 @dataclass(frozen=True)

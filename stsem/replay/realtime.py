@@ -10,7 +10,7 @@ from stsem.log.log import Loaded
 from stsem.replay.answer import AnswerRule
 from stsem.replay.queues import Mailbox
 from stsem.replay.schedule import Slot, watermarks
-from stsem.result import FrameResult, Outcome, Span
+from stsem.result import STAGES, FrameResult, Outcome, Span
 from stsem.sim.cores import CorePool, Job
 from stsem.sim.costs import CostSource
 from stsem.sim.events import EventQueue, Priority
@@ -19,7 +19,7 @@ from stsem.stages.register import Registration
 
 T = TypeVar("T")
 
-ORDER = {"decode": 0, "register": 1, "segment": 2, "propagate": 3, "fuse": 4}
+ORDER = {stage: place for place, stage in enumerate(STAGES)}
 """Place of each stage in the pipeline: among jobs of one frame the smaller goes first."""
 
 

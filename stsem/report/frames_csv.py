@@ -5,9 +5,7 @@ from typing import Any
 import pandas as pd
 
 from stsem.report.inputs import FrameRow, ReportInputs
-
-STAGES = ("register", "select", "segment", "propagate", "track", "fuse")
-"""Pipeline order: the order of stage columns, and of stages in every table and picture."""
+from stsem.result import STAGES
 
 _INTEGERS = (
     "frame", "log_stamp_ns", "stamp_ns", "arrival_ns", "taken_ns", "answered_ns", "keyframe", "distance_frames",

@@ -22,9 +22,9 @@ MODE_COLOURS = {"per-frame": "#0072b2", "keyframe": "#d55e00", "keyframe-async":
 _FURTHER = ("#b5488b", "#7a6a00", "#3d5a80")
 
 STAGE_COLOURS = {
-    "register": "#56b4e9", "select": "#9aa4ad", "segment": "#6f4ea0", "propagate": "#e6a817", "track": "#77838e",
-    "fuse": "#a5744f",
+    "decode": "#3b8f86", "register": "#56b4e9", "segment": "#6f4ea0", "propagate": "#e6a817", "fuse": "#a5744f",
 }  # fmt: skip
+"""One per stage of `stsem.result.STAGES`."""
 UNKNOWN_STAGE = "#9aa4ad"
 
 _RC: dict[Any, Any] = {

@@ -16,7 +16,7 @@ _MARKS = {
     Outcome.SEGMENTED: ("s", STAGE_COLOURS["segment"]), Outcome.PROPAGATED: ("o", STAGE_COLOURS["propagate"]),
     Outcome.DROPPED_BUSY: ("x", BAD), Outcome.NO_SOURCE: ("v", BAD), Outcome.PENDING: (">", BAD),
 }  # fmt: skip
-_DARK = ("segment", "fuse", "track")
+_DARK = ("decode", "segment", "fuse")
 _WORDS = {Outcome.DROPPED_BUSY: "dropped", Outcome.NO_SOURCE: "no source"}
 
 

@@ -2,9 +2,9 @@
 
 from stsem.document.schema import Document, Run
 from stsem.document.timing import Distribution, Latency, Outcomes, Throughput
-from stsem.report.frames_csv import STAGES
 from stsem.report.outline import Block, Column, Figure, Items, Row, Section, Table, Text
 from stsem.report.wording import NONE, count, meaning, number, percent, percentile, plural
+from stsem.result import STAGES
 
 _PERCENTILES = ("p50", "p90", "p95", "p99", "p999")
 _KINDS = ("from_arrival", "from_stamp", "waiting")
