@@ -34,15 +34,13 @@ class LogInput(Part):
     duration_s: Number = None
     """Last minus first colour stamp, seconds."""
     damage: dict[str, JsonValue] = Field(default_factory=dict)
-    """What is wrong with the file, by kind, with counts; empty when nothing is."""
+    """What is wrong with the file: `lossy`, and `counts` by kind and channel, which are empty when nothing is."""
     period_ms: Number = None
     """Median capture period of the colour frames, ms."""
     size: tuple[int, int] | None = None
     """Width and height of the colour image in pixels."""
     truth_size: tuple[int, int] | None = None
     """Width and height at which answers are scored."""
-    stamps_from: str = "header"
-    """`header`: capture stamps of the sensor; `log`: there are none, log times stand in for them."""
     channels: dict[str, Channel] = Field(default_factory=dict)
     """Role (`color`, `depth`, `pose`, `labels`, `camera`) -> channel used for it."""
     window_s: tuple[Number, Number] | None = None
@@ -55,9 +53,9 @@ class Input(Part):
     logs: tuple[LogInput, ...]
     """The logs; parts of one split recording are one log."""
     classes: tuple[str, ...] = ()
-    """Classes of the log in the order of their ids; empty without a class table."""
+    """Classes of the answers in the order of their ids: the log's, or the network's where the log's cannot be used."""
     colours: tuple[tuple[int, int, int], ...] = ()
-    """RGB 0..255 of each class for pictures; empty when the log has none."""
+    """RGB 0..255 of each class for pictures; empty where nobody gave any."""
     classes_unknown_to_network: tuple[str, ...] = ()
     """Truth classes that the network does not know: all their pixels are wrong."""
 
@@ -66,7 +64,7 @@ class Identity(Part):
     """What must be the same for the bytes to be the same."""
 
     backend: str = ""
-    """What ran the network: `onnxruntime`, `openvino`, or `oracle` for the truth as a perfect network."""
+    """What ran the network: `onnxruntime`, or `oracle` for the truth as a perfect network."""
     precision: str = ""
     """`f32`, `bf16` or `int8`."""
     versions: dict[str, str] = Field(default_factory=dict)
@@ -119,5 +117,3 @@ class Host(Part):
     """Harness time per frame outside the stages (reading, decoding, clock, metrics), ms."""
     peak_memory_bytes: Count | None = None
     """Largest resident set of the process, bytes."""
-    cached_outputs: Count = 0
-    """Network outputs that were read from the cache instead of computed."""

@@ -40,6 +40,8 @@ class MapScore(Part):
 
     points: Count = 0
     """Labelled points written."""
+    points_left_out: Count = 0
+    """Points that fell into new cells when the map was full, or too far away for its grid, and were forgotten."""
     voxels: Count = 0
     """Occupied voxels."""
     miou_3d: Share = None

@@ -46,6 +46,7 @@ CATALOGUE: tuple[tuple[str, Facts], ...] = (
     ("trajectory.*_m", Facts("m", False)),
     ("trajectory.*_deg", Facts("deg", False)),
     ("map.points", Facts("points", None)),
+    ("map.points_left_out", Facts("points", False)),
     ("map.voxels", Facts("voxels", None)),
     ("map.outlier_share", _LESS),
     ("map.*", _MORE),

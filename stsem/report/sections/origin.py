@@ -14,8 +14,6 @@ def input_section(document: Document) -> Section:
     damage = tuple(f"{log.name}: {kind.replace('_', ' ')}: {json.dumps(what)}" for log in document.input.logs
                    for kind, what in log.damage.items())  # fmt: skip
     blocks.append(Items(damage, warning=True) if damage else Text("No damage was found in the log."))
-    if any(log.stamps_from == "log" for log in document.input.logs):
-        blocks.append(Text("The log has no capture stamps: log times stand in for them."))
     return Section("Input", tuple(blocks))
 
 
@@ -132,7 +130,7 @@ def reproduce_section(document: Document) -> Section:
     facts = {
         **host.machine, "started": host.started_at, "wall-clock, s": _maybe(host.wall_s),
         "CPU time, s": _maybe(host.cpu_s), "harness overhead, ms per frame": _maybe(host.overhead_ms),
-        "cached network outputs": str(host.cached_outputs), "peak memory, MiB": memory,
+        "peak memory, MiB": memory,
     }  # fmt: skip
     rows = [Row((name, value)) for name, value in facts.items() if value and value != NONE]
     rows += [
