@@ -35,6 +35,7 @@ $(VENV)/.demo-ready: pyproject.toml
 	touch $@
 
 $(VENV)/.test-ready: $(VENV)/.demo-ready pyproject.toml
-	$(PIP) "$(TORCH)"
-	$(PIP) --editable '.[train,synth]' --group dev --group oracle
+	test -z "$(TORCH)" || $(PIP) "$(TORCH)"
+	$(PIP) --editable '.[synth]' --group dev --group oracle
+	test -z "$(TORCH)" || $(PIP) --editable '.[train]' --group torch-oracle
 	touch $@

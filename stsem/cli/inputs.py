@@ -116,7 +116,7 @@ def _trajectory(log: Log) -> bytes | None:
 def _map(context: Context, scratch: Path) -> Path | None:
     """map.ply of the last mode that built a map: `keyframe`, if it ran."""
     clouds = [run.cloud for run in context.replayed.runs if run.cloud is not None]
-    if not clouds or context.model.classes is None:
+    if not clouds:
         return None
     path = scratch / "map.ply"
     write_ply(path, clouds[-1].points, context.model.classes)

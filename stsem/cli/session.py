@@ -15,7 +15,8 @@ from stsem.document.canonical import to_bytes
 from stsem.document.difference import first_differences, repeatable_files
 from stsem.document.origin import Host, StageCost
 from stsem.document.schema import Document
-from stsem.errors import NotRepeatableError, UsageError
+from stsem.errors import NotRepeatableError, StsemError, UsageError
+from stsem.log.describe import log_name
 from stsem.log.log import Log, open_log
 from stsem.replay.build import Model, build_model, truth_frames
 from stsem.replay.config import RunConfig
@@ -28,9 +29,22 @@ from stsem.report.annotated import AnnotatedLog
 from stsem.report.folder import check_target, folder_name, write_folder
 from stsem.report.terminal import closing_table
 from stsem.search.probe import Probe
-from stsem.search.sustainable import search
+from stsem.search.sustainable import Sustainable, search
 
 REPORTS = Path("reports")
+
+
+@dataclass(frozen=True)
+class Began:
+    """When work on a log began, by the host's clocks, nanoseconds."""
+
+    wall_ns: int
+    cpu_ns: int
+
+    @classmethod
+    def now(cls) -> "Began":
+        """This instant."""
+        return cls(hostclock.wall_ns(), hostclock.process_cpu_ns())
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,16 +59,31 @@ class Session:
 
 
 def replay_all(recordings: Sequence[tuple[Path, ...]], config: RunConfig) -> int:
-    """Replay each recording into a report of its own; returns the largest exit code."""
+    """Replay each recording into a report of its own; returns the largest exit code.
+
+    With several recordings an error in one is said, and the others go on.
+    """
     folders = _folders(recordings, config.out)
-    return max(_replay_one(paths, config, out) for paths, out in zip(recordings, folders, strict=True))
+    if len(recordings) == 1:
+        return _replay_one(recordings[0], config, folders[0])
+    return max(_in_turn(paths, config, out) for paths, out in zip(recordings, folders, strict=True))
+
+
+def _in_turn(paths: tuple[Path, ...], config: RunConfig, out: Path | None) -> int:
+    try:
+        return _replay_one(paths, config, out)
+    except UsageError:
+        raise
+    except StsemError as err:
+        note(f"stsem: {err}")
+        return err.exit_code
 
 
 def _folders(recordings: Sequence[tuple[Path, ...]], out: Path | None) -> list[Path | None]:
     """Where each report goes: `out` itself for one log, else below it by name; None is the default place."""
     if out is None or len(recordings) == 1:
         return [out] * len(recordings)
-    names = [paths[0].stem for paths in recordings]
+    names = [log_name(paths) for paths in recordings]
     if twice := [name for name in names if names.count(name) > 1]:
         raise UsageError(
             f"Two logs are named {twice[0]}, but --out gives each log a folder of its name; replay them one by one."
@@ -63,9 +92,12 @@ def _folders(recordings: Sequence[tuple[Path, ...]], out: Path | None) -> list[P
 
 
 def _replay_one(paths: tuple[Path, ...], config: RunConfig, out: Path | None) -> int:
-    began = hostclock.wall_ns()
-    check_target(out or REPORTS / paths[0].stem / "report")
-    with progress(f"Reading {paths[0].name}") as step:
+    began = Began.now()
+    name = log_name(paths)
+    check_target(out or REPORTS / name / "report")
+    if len(paths) > 1:
+        note(f"Reading {', '.join(path.name for path in paths)} as one recording in parts.")
+    with progress(f"Reading {name}") as step:
         log = open_log(
             paths,
             topics={str(role): topic for role, topic in config.topic.items()},
@@ -94,34 +126,37 @@ def _replay(session: Session, annotated: AnnotatedLog | None) -> Context:
     watch = None if annotated is None else lambda mode, result, frame: annotated.answer(mode.name, result, frame)
     with progress(f"Replaying {log.info.name}") as step:
         replayed = replay_log(log, config, model, None if costs is None else costs.of, step, watch)
-    return Context(log, config, model, costs, replayed, _sustainable(session))
+    rates = _sustainable(session)
+    notes = tuple(
+        f"{mode} sustains {found.hz:g} Hz, the highest rate tried; it may sustain more."
+        for mode, found in rates.items()
+        if found.on_bound
+    )
+    return Context(log, config, model, costs, replayed, {mode: found.hz for mode, found in rates.items()}, notes)
 
 
-def _sustainable(session: Session) -> dict[str, float | None]:
+def _sustainable(session: Session) -> dict[str, Sustainable]:
     """Mode -> the highest rate it sustains, in frames per second, where that was asked for."""
     log, config, costs = session.log, session.config, session.costing
     if not config.sustainable or costs is None:
         return {}
-    if costs.sha256 is None:
-        raise UsageError("--sustainable needs durations that repeat; give --costs auto or a file instead of measured.")
     usable = truth_frames(log) if config.is_oracle else None
     deadline = deadline_ns(config.deadline_ms, log.period_ns, Fraction(1))
     probe = Probe(log, config, costs.of, fused=session.fused, usable=usable, patience_ns=deadline)
     return {
-        mode.name: search(partial(probe.attempt, mode), capture_hz=1e9 / log.period_ns, deadline_ns=deadline).hz
+        mode.name: search(partial(probe.attempt, mode), capture_hz=1e9 / log.period_ns, deadline_ns=deadline)
         for mode in config.modes
     }
 
 
-def _write(session: Session, out: Path | None, began_ns: int) -> tuple[Document, Path]:
+def _write(session: Session, out: Path | None, began: Began) -> tuple[Document, Path]:
     with tempfile.TemporaryDirectory(prefix="stsem-") as scratch:
         path = Path(scratch) / "annotated.mcap"
-        classes = session.model.classes
-        annotated = AnnotatedLog(path, classes) if session.config.annotate and classes is not None else None
+        annotated = AnnotatedLog(path, session.model.classes) if session.config.annotate else None
         context = _replay(session, annotated)
         if annotated is not None:
             finish_annotated(annotated, context)
-        document = build_document(context, _host(session, context, began_ns))
+        document = build_document(context, _host(session, context, began))
         folder = out or REPORTS / session.log.info.name / folder_name(document)
         inputs = report_inputs(context, document, Path(scratch), plots=session.config.plots)
         return document, write_folder(replace(inputs, annotated=None if annotated is None else path), folder)
@@ -134,14 +169,14 @@ def _check_repeats(session: Session, first: Path, number: int) -> None:
         NotRepeatableError: they differ; the first field and frame are named.
     """
     with tempfile.TemporaryDirectory(prefix="stsem-") as scratch:
-        _, again = _write(session, Path(scratch) / "again", hostclock.wall_ns())
+        _, again = _write(session, Path(scratch) / "again", Began.now())
         found = first_differences(repeatable_files(first), repeatable_files(again))
     if found:
         where = "; ".join(map(str, found[:3]))
         raise NotRepeatableError(f"Replay {number} differs from the first ({first}): {where}.")
 
 
-def _host(session: Session, context: Context, began_ns: int) -> Host:
+def _host(session: Session, context: Context, began: Began) -> Host:
     replayed = context.replayed
     inside = sum(sum(times) for times in replayed.stage_times_ns.values())
     return Host(
@@ -150,8 +185,8 @@ def _host(session: Session, context: Context, began_ns: int) -> Host:
         command=" ".join(sys.argv),
         machine=hostclock.machine_facts(),
         started_at=hostclock.utc_now(),
-        wall_s=(hostclock.wall_ns() - began_ns) / 1e9,
-        cpu_s=hostclock.process_cpu_ns() / 1e9,
+        wall_s=(hostclock.wall_ns() - began.wall_ns) / 1e9,
+        cpu_s=(hostclock.process_cpu_ns() - began.cpu_ns) / 1e9,
         stages={
             stage: StageCost(mean_ms=sum(times) / len(times) / 1e6, max_ms=max(times) / 1e6, n=len(times))
             for stage, times in sorted(replayed.stage_times_ns.items())
@@ -170,5 +205,4 @@ def _print(document: Document, folder: Path, config: RunConfig) -> None:
         note(" ".join(document.state_reasons))
     for warning in document.warnings:
         note(f"Note: {warning}")
-    shown = folder if folder.is_absolute() else Path(*folder.parts)
-    (note if config.json_ else print)(f"Report: {shown / 'report.html'}")
+    (note if config.json_ else print)(f"Report: {folder / 'report.html'}")

@@ -32,7 +32,7 @@ def synth(
     from stsem.synth.generate import render_log
 
     width, times, height = size.partition("x")
-    if not (times and width.isdigit() and height.isdigit()):
+    if not (times and size.isascii() and width.isdigit() and height.isdigit()):
         raise UsageError(f"--size takes WIDTHxHEIGHT, such as 480x270, but {size!r} came.")
     with progress(f"Rendering {out.name}") as step:
         render_log(

@@ -18,8 +18,8 @@ def inspection_text(found: Inspection) -> str:
 def _head(found: Inspection) -> str:
     log = found.log
     return (
-        f"{log['name']}: {float(str(log['size_bytes'])) / 1e6:.1f} MB, {float(str(log['duration_s'])):.1f} s, profile "
-        f"{log['profile'] or 'none'}, written by {log['library'] or 'unknown'}\nsha256 {log['sha256']}"
+        f"{log.name}: {log.size_bytes / 1e6:.1f} MB, {log.duration_s:.1f} s, profile {log.profile or 'none'}, "
+        f"written by {log.library or 'unknown'}\nsha256 {log.sha256}"
     )
 
 
@@ -27,9 +27,8 @@ def _channels(found: Inspection) -> str:
     headers = ["topic", "schema", "encoding", "messages", "Hz", "largest gap", "log - stamp min/median", "used as"]
     rows = [
         [
-            c["topic"], c["schema"], c["encoding"], c["count"], _number(c["rate_hz"], "{:.2f}"),
-            _number(c["largest_gap_s"], "{:.3f} s"),
-            f"{_ms(c['offset_min_ns'])} / {_ms(c['offset_median_ns'])}", c["role"] or _NONE,
+            c.topic, c.schema, c.encoding, c.count, _number(c.rate_hz, "{:.2f}"), _number(c.largest_gap_s, "{:.3f} s"),
+            f"{_ms(c.offset_min_ns)} / {_ms(c.offset_median_ns)}", c.role or _NONE,
         ]
         for c in found.channels
     ]  # fmt: skip
@@ -82,9 +81,9 @@ def _warnings(found: Inspection) -> str:
     return "\n".join(lines)
 
 
-def _number(value: object, form: str) -> str:
+def _number(value: float | None, form: str) -> str:
     return _NONE if value is None else form.format(value)
 
 
-def _ms(ns: object) -> str:
-    return _NONE if ns is None else f"{float(str(ns)) / 1e6:.1f} ms"
+def _ms(ns: int | None) -> str:
+    return _NONE if ns is None else f"{ns / 1e6:.1f} ms"

@@ -1,6 +1,5 @@
 """The libraries that run a network: one row per backend."""
 
-import importlib.util
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ import numpy as np
 import onnxruntime
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 
-from stsem.errors import MissingExtraError, NetworkError, UsageError
+from stsem.errors import NetworkError, UsageError
 from stsem.inference.preprocess import Tensor
 
 DEFAULT_BACKEND = "onnxruntime"
@@ -82,19 +81,14 @@ class Backend:
 BACKENDS: dict[str, Backend] = {
     "onnxruntime": Backend(("f32",), "onnxruntime", OrtSession),
 }
-EXTRAS: dict[str, str] = {"openvino": "openvino"}
-"""Backends of which only the name is known to this installation -> the extra that brings them."""
 
 
 def choose_backend(name: str, precision: str) -> Backend:
     """The row for `name`, checked against `precision`.
 
     Raises:
-        MissingExtraError: the backend needs a package that is not installed.
         UsageError: no such backend, or it does not compute in `precision`.
     """
-    if name in EXTRAS and name not in BACKENDS and importlib.util.find_spec(name) is None:
-        raise MissingExtraError(EXTRAS[name], f"The backend {name}")
     if name not in BACKENDS:
         raise UsageError(f"There is no backend {name!r} in this version; choose one of {', '.join(BACKENDS)}.")
     row = BACKENDS[name]

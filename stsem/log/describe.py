@@ -19,7 +19,7 @@ def describe(paths: Sequence[Path], scan: Scan, assembly: Assembly) -> LogInfo:
     roles = _roles(assembly, tracks)
     stamps = assembly.color.rows.stamp_ns
     return LogInfo(
-        name=_name(paths),
+        name=log_name(paths),
         paths=tuple(file.path for file in scan.files),
         sha256=scan.sha256,
         size_bytes=sum(file.size for file in scan.files),
@@ -34,7 +34,7 @@ def describe(paths: Sequence[Path], scan: Scan, assembly: Assembly) -> LogInfo:
     )
 
 
-def _name(paths: Sequence[Path]) -> str:
+def log_name(paths: Sequence[Path]) -> str:
     """Name of the only file or folder; of several files, of the first in order of their names."""
     first = min(paths, key=lambda path: path.name)
     resolved = first.resolve()

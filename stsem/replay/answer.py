@@ -81,16 +81,15 @@ class AnswerRule:
         self._selected = frame, registration
         return reason
 
-    def segment(self, frame: Frame, registration: Registration | None) -> Segmentation | None:
+    def segment(self, frame: Frame) -> Segmentation | None:
         """Labels from the network; None if this frame cannot be segmented at all. Call `finish` to make it a source."""
         answer = self._segmenter.segment(frame)
         return answer if self._segmenter.can_segment(frame.index) else None
 
-    def finish(self, frame: Frame, registration: Registration | None, answer: Segmentation) -> None:
+    def finish(self, frame: Frame, answer: Segmentation) -> None:
         """The keyframe `frame` is finished: later frames may be predicted from it."""
         if self._source is None or frame.stamp_ns >= self._source.stamp_ns:
-            features = None if registration is None else registration.features
-            self._source = Keyframe(frame.index, frame.stamp_ns, answer, features)
+            self._source = Keyframe(frame.index, frame.stamp_ns, answer)
 
     def propagate(self, frame: Frame, registration: Registration | None) -> Segmentation | None:
         """Labels predicted from `source`; None without one, or in a mode that never predicts."""

@@ -24,7 +24,7 @@ from stsem.stages.segment import NetworkSegmenter, OracleSegmenter, Segmenter
 from stsem.stages.select import parse_policy
 
 NETWORK_THREADS = 2
-"""Threads of the network outside `--costs measured`; its output does not depend on them."""
+"""Threads of the network on two or more simulated cores; its output does not depend on them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Model:
 
     name: str
     network: Network | None
-    classes: ClassSet | None
+    classes: ClassSet
     translation: Labels | None
     reason: str
     segmenter: Callable[[int, StageTimes], Segmenter]

@@ -57,9 +57,9 @@ def measure(subject: Subject, frames: list[Frame], *, samples: int = SAMPLES, li
     """
     found: dict[str, tuple[int, ...]] = {}
     disturbed = False
-    for name, cores, work in _stages(subject, frames):
+    for name, cores, usable, work in _stages(subject, frames):
         set_threads(cores)
-        kept, was_disturbed = _sample(work, frames, samples, limit_ns)
+        kept, was_disturbed = _sample(work, usable, samples, limit_ns)
         found[key(name, cores)] = kept
         disturbed |= was_disturbed
     set_threads(1)
@@ -71,25 +71,26 @@ def measure(subject: Subject, frames: list[Frame], *, samples: int = SAMPLES, li
     return CostProfile(hostclock.machine_name(), found, disturbed, made_for)
 
 
-def _stages(subject: Subject, frames: list[Frame]) -> Iterator[tuple[str, int, Callable[[Frame], object]]]:
+def _stages(subject: Subject, frames: list[Frame]) -> Iterator[tuple[str, int, list[Frame], Callable[[Frame], object]]]:
+    """(stage, cores, frames to measure it on, its work)."""
     register = Register(subject.seed)
     features: Features = register(frames[0], None, None).features
     answer = None
     for cores in subject.network_cores:
         network = Inferencer(subject.network, backend=subject.backend, precision=subject.precision, threads=cores)
         answer = network.infer(frames[0])
-        yield "segment", cores, network.infer
+        yield "segment", cores, frames, network.infer
     if answer is None:
         raise ValueError("a profile needs the network on at least one number of cores")
     keyframe = Keyframe(frames[0].index, frames[0].stamp_ns, answer, features)
     last = register(frames[1], features, frames[0].index).homography
     fuse, labels = Fuse(LabelledCloud()), answer
-    yield "register", 1, lambda frame: register(frame, features, frames[0].index)
-    yield "propagate", 1, lambda frame: subject.propagation.propagate(keyframe, frame, last)
+    yield "register", 1, frames, lambda frame: register(frame, features, frames[0].index)
+    yield "propagate", 1, frames, lambda frame: subject.propagation.propagate(keyframe, frame, last)
     if (decode := subject.decode) is not None:
-        yield "decode", 1, lambda frame: decode()
-    if any(fuse.can_fuse(frame) for frame in frames):
-        yield "fuse", 1, lambda frame: fuse(frame, labels)
+        yield "decode", 1, frames, lambda frame: decode()
+    if fusable := [frame for frame in frames if fuse.can_fuse(frame)]:
+        yield "fuse", 1, fusable, lambda frame: fuse(frame, labels)
 
 
 def _sample(

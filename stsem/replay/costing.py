@@ -9,12 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from stsem import hostclock
+from stsem import __version__, hostclock
 from stsem.errors import CostError, DecodeError, OutputError, UsageError
 from stsem.frame import Frame
 from stsem.inference.cache import cache_root
 from stsem.inference.network import DEFAULT, Network, load_network
 from stsem.log.log import Log
+from stsem.log.plan import NEEDS
 from stsem.replay.build import Model
 from stsem.replay.calibrate import Subject, measure
 from stsem.replay.config import RunConfig
@@ -57,8 +58,7 @@ def costing(log: Log, config: RunConfig, model: Model, *, fused: bool, say: Call
         CostError: a profile or trace that cannot be used.
     """
     if config.costs == "measured":
-        if config.count_decode:
-            raise UsageError("--count-decode needs a cost profile; give --costs auto or a file instead of measured.")
+        _refuse_measured(config)
         return Costing("measured", lambda mode: MeasuredCosts(hostclock.wall_ns), None, None)
     if config.costs == "auto":
         return _of_profile("auto", _calibrated(log, config, model, fused, say), log, config)
@@ -68,10 +68,24 @@ def costing(log: Log, config: RunConfig, model: Model, *, fused: bool, say: Call
     except OSError as err:
         raise CostError(f"The costs {path} cannot be read: {err.strerror or err}; give a profile or a trace.") from err
     if is_trace(data):
+        if config.sustainable:
+            raise UsageError("--sustainable needs a cost profile; a trace knows only the jobs of one run.")
         durations, sha256 = read_durations(path)
         return Costing("trace of an earlier run", lambda mode: TraceCosts(durations, mode.name, sha256), sha256, None)
     profile = load_profile(path)
     return _of_profile(f"profile of {profile.machine}", profile, log, config)
+
+
+def _refuse_measured(config: RunConfig) -> None:
+    """Raise UsageError for what makes no sense with durations measured as they happen."""
+    wrong = {
+        "--count-decode": config.count_decode,
+        "--model oracle (it costs what the default network costs)": config.is_oracle,
+        "--sustainable": config.sustainable,
+        "--repeat": config.repeat > 1,
+    }
+    if asked := [name for name, wanted in wrong.items() if wanted]:
+        raise UsageError(f"{asked[0]} needs a cost profile; give --costs auto or a file instead of measured.")
 
 
 def _of_profile(name: str, profile: CostProfile, log: Log, config: RunConfig) -> Costing:
@@ -89,13 +103,14 @@ def subject(log: Log, config: RunConfig, model: Model, cores: tuple[int, ...], *
 
 
 def calibration_frames(log: Log, *, fused: bool) -> list[Frame]:
-    """The first decodable frames of the log.
+    """The first decodable frames of the log that lack nothing, or, when there are too few of them, the first at all.
 
     Raises:
         CostError: fewer than two frames can be decoded.
     """
     found: list[Frame] = []
-    indices = [plan.index for plan in log.plans]
+    needs = NEEDS if fused else frozenset[str]()
+    indices = [plan.index for plan in sorted(log.plans, key=lambda plan: bool(plan.missing(needs)))]
     with contextlib.closing(log.frames(indices, depth=fused, previous=True, truth=False)) as supply:
         while len(found) < _CALIBRATION_FRAMES and (loaded := next(supply, None)) is not None:
             if loaded.frame is not None:
@@ -114,6 +129,7 @@ def _calibrated(log: Log, config: RunConfig, model: Model, fused: bool, say: Cal
         "backend": [wanted.backend, wanted.precision], "cores": wanted.network_cores,
         "propagation": config.propagation, "fused": fused, "decode": config.count_decode,
         "onnxruntime": importlib.metadata.version("onnxruntime"),
+        "opencv": importlib.metadata.version("opencv-python-headless"), "stsem": __version__,
     }  # fmt: skip
     digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:16]
     path = cache_root() / "costs" / f"{digest}.json"

@@ -14,7 +14,7 @@ from stsem.replay.comparison import Contender, compare
 from stsem.replay.engine import Replayed
 from stsem.replay.runs import Context, Found, part, scored, without_scores
 
-_PACKAGES = ("mcap", "numpy", "onnxruntime", "opencv-python-headless", "scipy")
+_PACKAGES = ("mcap", "numpy", "onnxruntime", "opencv-python-headless")
 
 
 def build_document(context: Context, host: Host) -> Document:
@@ -115,8 +115,8 @@ def _input(context: Context, found: list[Found]) -> Input:
     scores = [accuracy for f in found for accuracy in (f.offline, f.clocked) if accuracy is not None]
     return Input(
         logs=(_log_input(context),),
-        classes=() if classes is None else classes.names,
-        colours=() if classes is None else classes.colours,
+        classes=classes.names,
+        colours=classes.colours,
         classes_unknown_to_network=scores[0].unknown if scores else (),
     )
 
@@ -130,7 +130,7 @@ def _log_input(context: Context) -> LogInput:
         sha256=log.info.sha256,
         frames=len(slots),
         frames_with_truth=sum(slot.has_truth for slot in slots),
-        duration_s=log.info.duration_s,
+        duration_s=(slots[-1].log_stamp_ns - slots[0].log_stamp_ns) / 1e9 if slots else None,
         damage=log.info.damage.as_dict(),
         period_ms=log.period_ns / 1e6,
         size=pictures[0].image.shape[1::-1] if pictures else None,
@@ -160,7 +160,7 @@ def _channels(log: Log) -> dict[str, Channel]:
 
 
 def _warnings(context: Context) -> tuple[str, ...]:
-    found = list(context.log.info.warnings)
+    found = [*context.log.info.warnings, *context.notes]
     costing = context.costing
     if costing is not None and costing.profile is not None and costing.profile.disturbed:
         found.append("The cost profile was measured while other work held a core; its durations are too long.")

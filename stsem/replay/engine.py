@@ -75,7 +75,7 @@ def replay_log(
     fused, times = can_map(log, config), StageTimes()
     roles = frozenset({"depth", "pose"}) if fused else frozenset()
     slots = schedule(log.plans, config.exact_rate, frozenset(), roles)
-    segmenter = model.segmenter(NETWORK_THREADS, times)
+    segmenter = model.segmenter(min(NETWORK_THREADS, config.cores), times)
     setup = Setup(config, model, segmenter, costs_of, slots, _pictured(slots), fused, times)
     lanes = [Lane(setup, mode, _watch_of(mode, watch)) for mode in config.modes]
     pictures = _feed(log, setup, lanes, progress)

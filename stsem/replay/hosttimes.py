@@ -35,10 +35,6 @@ class StageTimes:
         self.durations_ns.setdefault(stage, []).append(hostclock.wall_ns() - before)
         return result
 
-    def total_ns(self) -> int:
-        """Time spent inside stages."""
-        return sum(sum(durations) for durations in self.durations_ns.values())
-
 
 class TimedInferencer(Inferencer):
     """An `Inferencer` whose network is timed; what comes from a cache is not."""

@@ -139,6 +139,6 @@ class Lane:
 
     def _record(self, *, primary: bool, watch: Watch | None) -> Record:
         setup, model = self._setup, self._setup.model
-        scores = None if model.reason or model.classes is None else scorecard_for(model.classes, model.translation)
+        scores = None if model.reason else scorecard_for(model.classes, model.translation)
         classes = model.classes if primary else None
         return Record(setup.slots, scores, setup.pictured, classes, watch if primary else None)

@@ -51,11 +51,11 @@ class OfflineRun:
             outcome = Outcome.NO_SOURCE if answer is None else Outcome.PROPAGATED
             self._end(slot, loaded, outcome, answer=answer, keyframe=source)
             return
-        answer = self._rule.segment(frame, registration)
+        answer = self._rule.segment(frame)
         if answer is None:
             self._end(slot, loaded, Outcome.NO_SOURCE, reason="no truth for the oracle")
             return
-        self._rule.finish(frame, registration, answer)
+        self._rule.finish(frame, answer)
         if self._fuse is not None and self._fuse.can_fuse(frame):
             self._fuse(frame, answer)
         self._end(slot, loaded, Outcome.SEGMENTED, answer=answer, keyframe=slot.index, reason=reason)

@@ -179,7 +179,7 @@ class RealTimeRun:
             cores = self._machine.network_cores
             segment = self._rule.segment
             self._submit(
-                task.frame, "segment", cores, lambda: segment(task.frame, task.registration),
+                task.frame, "segment", cores, lambda: segment(task.frame),
                 lambda answer: self._segmented(task, answer),
             )  # fmt: skip
         elif self._rule.source is None:
@@ -197,7 +197,7 @@ class RealTimeRun:
             task.reason = "no truth for the oracle"
             self._answer(task, Outcome.NO_SOURCE, None, None)
             return
-        self._rule.finish(task.frame, task.registration, answer)
+        self._rule.finish(task.frame, answer)
         fuse = self._machine.fuse
         if fuse is not None and fuse.can_fuse(task.frame):
             self._submit(task.frame, "fuse", 1, lambda: fuse(task.frame, answer), lambda _: None)

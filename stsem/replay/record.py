@@ -57,12 +57,13 @@ class Record:
 
         Without a clock, a frame that cannot be decoded or completed was never asked about, and is not judged.
         """
+        result = replace(result, coverage=_coverage(result.labels))
         never_came = result.arrival_ns is None and result.outcome in (Outcome.UNDECODABLE, Outcome.INCOMPLETE)
         if self.scorecard is not None and loaded.truth is not None and not never_came:
             self._judge(self.scorecard, result, loaded.truth)
         if result.labels is not None:
             self._look(result, loaded, result.labels)
-        self.results.append(replace(result, labels=None, coverage=_coverage(result.labels)))
+        self.results.append(replace(result, labels=None))
 
     def _look(self, result: FrameResult, loaded: Loaded, labels: Labels) -> None:
         if result.index in self._watched:

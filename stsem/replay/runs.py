@@ -28,7 +28,13 @@ NO_OFFLINE = "--no-offline"
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What every mode of one report shares; `sustainable_hz` by mode, where it was searched for."""
+    """What every mode of one report shares.
+
+    Args:
+        log, config, model, costing, replayed: what was replayed, how, and what came of it.
+        sustainable_hz: mode -> highest sustained rate, where it was searched for.
+        notes: what a reader must know besides the log's own warnings.
+    """
 
     log: Log
     config: RunConfig
@@ -36,6 +42,7 @@ class Context:
     costing: Costing | None
     replayed: Replayed
     sustainable_hz: Mapping[str, float | None] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +88,6 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
     streaming = None if found.clocked is None else found.clocked.streaming
     offline = None if found.offline is None else found.offline.own
     classes = context.model.classes
-    if classes is None:
-        raise ValueError("a run without classes")
     return Run(
         mode=run.mode.name,
         clock=config.clock,

@@ -42,11 +42,6 @@ class EventQueue:
         """Simulated time; it only ever grows."""
         return self._now_ns
 
-    @property
-    def next_ns(self) -> int | None:
-        """When the next event is due; None when nothing is."""
-        return self._heap[0][0] if self._heap else None
-
     def __len__(self) -> int:
         return len(self._heap)
 

@@ -71,7 +71,7 @@ def test_costs_measure_and_scale(cli: Cli, home: Path, tiny_log: Path, monkeypat
 
 def test_measured_costs_are_a_look(cli: Cli, home: Path, tiny_log: Path) -> None:
     """Every job's own duration: the report says that it does not repeat."""
-    ran = cli("replay", tiny_log, "--model", "oracle", "--costs", "measured", "--no-plots", "--out", "r")
+    ran = cli("replay", tiny_log, "--costs", "measured", "--no-plots", "--out", "r")
     assert ran.code == 0
     assert "does not repeat" in ran.err
     document = report("r")

@@ -4,10 +4,11 @@ import hashlib
 from pathlib import Path
 
 import numpy as np
-import onnx
 import onnxruntime
 import pytest
-import torch
+
+torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
+onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 
 from stsem.errors import NetworkError, UsageError
 from stsem.models.export import agreement, export_onnx

@@ -156,7 +156,7 @@ def test_an_older_keyframe_never_replaces_a_newer_one() -> None:
     rule = AnswerRule(NumberSegmenter(), Prediction(EveryPolicy(1), CopyKeyframe(), None))
     frames = [Frame(i, i, np.zeros((4, 4, 3), np.uint8)) for i in range(3)]
     for i in (1, 0, 2):
-        rule.finish(frames[i], None, Segmentation(np.full((4, 4), i, np.uint8)))
+        rule.finish(frames[i], Segmentation(np.full((4, 4), i, np.uint8)))
         assert rule.source is not None
         assert rule.source.index == max(i, 1)
 
@@ -168,7 +168,7 @@ def test_nothing_to_predict_from() -> None:
         AnswerRule(NumberSegmenter(), Prediction(EveryPolicy(1), CopyKeyframe(), None)).propagate(frame, None) is None
     )
     rule = AnswerRule(NumberSegmenter(), None)
-    rule.finish(frame, None, Segmentation(np.zeros((4, 4), np.uint8)))
+    rule.finish(frame, Segmentation(np.zeros((4, 4), np.uint8)))
     assert rule.propagate(frame, None) is None
 
 

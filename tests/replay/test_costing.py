@@ -115,12 +115,13 @@ def test_a_profile_from_a_file(log: Log, made_up_costs: Path) -> None:
 
 def test_measured(log: Log) -> None:
     """No digest, hence no gate and no search; decoding is no job then."""
-    found = ask(log, costs="measured")
+    found = ask(log, costs="measured", model="default")
     assert (found.sha256, found.profile) == (None, None)
     result, cost = found.of(MODES["keyframe"]).run(0, "segment", 2, lambda: 42)
     assert (result, cost >= 0) == (42, True)
-    with pytest.raises(UsageError, match="--count-decode"):
-        ask(log, costs="measured", count_decode=True)
+    for wrong in ({"count_decode": True}, {"model": "oracle"}, {"sustainable": True}, {"repeat": 2}):
+        with pytest.raises(UsageError, match="needs a cost profile"):
+            ask(log, **{"costs": "measured", "model": "default", **wrong})
 
 
 def test_calibration_needs_two_frames(tmp_path: Path) -> None:

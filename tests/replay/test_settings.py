@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stsem.document.canonical import canonical
 from stsem.errors import UsageError
 from stsem.replay.config import RunConfig
 from stsem.replay.settings import keys, nearest, parse_topics, resolve, validated
@@ -127,21 +128,21 @@ def base(**changes: Any) -> RunConfig:
 
 
 def test_what_is_reported() -> None:
-    """Nothing about places and display; files by name; the digest follows what is reported."""
+    """Nothing about places and display; files by name; everything that moves a result."""
     found = base(model="/somewhere/else/net.onnx", costs="/there/robot.json", out="/tmp/x", repeat=3, json=True)
     reported = found.reported()
     assert (reported["model"], reported["costs"]) == ("net.onnx", "file")
     assert not {"out", "repeat", "json", "json_", "plots", "cache", "annotate", "classes", "class_map"} & set(reported)
     assert "/somewhere" not in str(reported)
-    assert base(out="/a", repeat=2, plots=False, cache=False).digest() == base().digest()
+    assert base(out="/a", repeat=2, plots=False, cache=False).reported() == base().reported()
     changes: list[dict[str, Any]] = [
         {"seed": 1}, {"rate": "2"}, {"mode": "keyframe"}, {"queue": "lossless"}, {"cores": 1}, {"map": False},
         {"topic": {"color": "/a"}}, {"start": 1.0}, {"keyframe_rotation": 0.2}, {"offline": False}, {"model": "oracle"},
     ]  # fmt: skip
-    assert len({base(**change).digest() for change in [{}, *changes]}) == len(changes) + 1
+    assert len({canonical(base(**change).reported()) for change in [{}, *changes]}) == len(changes) + 1
 
 
 def test_equal_spellings_are_one_configuration() -> None:
     """`both` is both modes in any order, 0.5 is 1/2."""
-    assert base(mode="both").digest() == base(mode="keyframe, per-frame").digest() == base().digest()
-    assert base(rate="0.5").digest() == base(rate="1/2").digest() == base(rate=0.5).digest()
+    assert base(mode="both").reported() == base(mode="keyframe, per-frame").reported() == base().reported()
+    assert base(rate="0.5").reported() == base(rate="1/2").reported() == base(rate=0.5).reported()

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
+
+torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
 from stsem.classes import NO_LABEL, ClassSet
 from stsem.errors import NetworkError, TrainingError
