@@ -1,7 +1,10 @@
 """annotated.mcap: the answers of a run and its images on the log's own clock, for Foxglove, Lichtblick and Rerun."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import TracebackType
 from typing import Any
 
 import cv2
@@ -13,8 +16,10 @@ from mcap.writer import CompressionType, Writer
 
 from stsem import __version__
 from stsem.classes import NO_LABEL, ClassSet, Labels
+from stsem.errors import OutputError
 from stsem.frame import Frame, Image
 from stsem.log import encode
+from stsem.log.classtable import METADATA
 from stsem.result import FrameResult
 
 _OPAQUE = 0.55
@@ -30,25 +35,41 @@ _ANSWER_SCHEMA = {
 
 
 class AnnotatedLog:
-    """Writes channels per mode while a replay goes on; call `close` at the end.
+    """Writes channels per mode while a replay goes on: `with AnnotatedLog(...)`, which leaves no file after an error.
 
     Channels: `/stsem/MODE/overlay` (CompressedImage), `/stsem/MODE/labels` (RawImage rgb8 in the classes' colours),
     `/stsem/MODE/answer` (JSON: outcome, keyframe, latency), `/stsem/pose` (FrameTransform), `/stsem/map` (PointCloud).
-    Message times are capture stamps of the log, so that it lines up with the log it was made from.
+    Message times are capture stamps of the log, so that it lines up with the log it was made from. The metadata record
+    `stsem.classes` says name -> `#rrggbb id`: with it, the labels read back as a log's truth would.
 
     Args:
         path: the file.
         classes: names and colours of the labels.
+
+    Raises:
+        OutputError: the file cannot be written; also from every method.
     """
 
     def __init__(self, path: Path, classes: ClassSet) -> None:
-        self._stream = path.open("wb")
-        self._writer = Writer(self._stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
-        self._writer.start("", f"stsem {__version__}")
-        self._writer.add_metadata("stsem.classes", {str(i): name for i, name in enumerate(classes.names)})
-        self._palette = classes.palette()
+        self._path, self._palette = path, classes.palette()
         self._channels: dict[str, int] = {}
         self._posed: set[int] = set()
+        with _writing(path):
+            self._stream = path.open("wb")
+            self._writer = Writer(self._stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+            self._writer.start("", f"stsem {__version__}")
+            self._writer.add_metadata(METADATA, _legend(classes))
+
+    def __enter__(self) -> "AnnotatedLog":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self._discard()
 
     def answer(self, mode: str, result: FrameResult, frame: Frame) -> None:
         """One answered frame of one mode; `result.labels` are shown at the size of the image."""
@@ -81,23 +102,58 @@ class AnnotatedLog:
         self._message("/stsem/map", stamp_ns, cloud)
 
     def close(self) -> None:
-        """Finish the file."""
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._stream.close()
+        """Finish the file; nothing happens when it is closed already."""
+        if self._stream.closed:
+            return
+        try:
+            with _writing(self._path):
+                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._stream.close()
+        except OutputError:
+            self._discard()
+            raise
+
+    def _discard(self) -> None:
+        with suppress(OSError):  # closing writes what is buffered, which may be what went wrong
+            self._stream.close()
+        self._path.unlink(missing_ok=True)
 
     def _message(self, topic: str, stamp_ns: int, message: Any) -> None:
         if topic not in self._channels:
             schema = type(message).get_schema()
-            schema_id = self._writer.register_schema(schema.name, schema.encoding, schema.data)
-            self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.Protobuf, schema_id)
-        self._writer.add_message(self._channels[topic], stamp_ns, message.encode(), stamp_ns)
+            self._channel(topic, schema.name, schema.encoding, schema.data, MessageEncoding.Protobuf)
+        self._add(topic, stamp_ns, message.encode())
 
     def _json(self, topic: str, stamp_ns: int, facts: dict[str, Any]) -> None:
         if topic not in self._channels:
             schema = json.dumps(_ANSWER_SCHEMA).encode()
-            schema_id = self._writer.register_schema("stsem.Answer", SchemaEncoding.JSONSchema, schema)
-            self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.JSON, schema_id)
-        self._writer.add_message(self._channels[topic], stamp_ns, json.dumps(facts).encode(), stamp_ns)
+            self._channel(topic, "stsem.Answer", SchemaEncoding.JSONSchema, schema, MessageEncoding.JSON)
+        self._add(topic, stamp_ns, json.dumps(facts).encode())
+
+    def _channel(self, topic: str, schema: str, kind: str, definition: bytes, encoding: str) -> None:
+        with _writing(self._path):
+            schema_id = self._writer.register_schema(schema, kind, definition)
+            self._channels[topic] = self._writer.register_channel(topic, encoding, schema_id)
+
+    def _add(self, topic: str, stamp_ns: int, data: bytes) -> None:
+        with _writing(self._path):
+            self._writer.add_message(self._channels[topic], stamp_ns, data, stamp_ns)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as err:
+        raise OutputError(
+            f"The annotated log {path} cannot be written ({err.strerror or err}); make room or leave out --annotate."
+        ) from err
+
+
+def _legend(classes: ClassSet) -> dict[str, str]:
+    """name -> "#rrggbb id", as stsem reads class tables of colour-coded labels."""
+    colours = classes.palette()
+    return {name: f"#{colours[i].tobytes().hex()} {i}" for i, name in enumerate(classes.names)}
 
 
 def _facts(result: FrameResult) -> dict[str, Any]:
