@@ -72,11 +72,20 @@ def check_target(folder: Path) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"The output {folder} is a file, a folder was expected; choose another place with --out.")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / "report.json").is_file():
+    if folder.is_dir() and _holds_something_else(folder):
         raise OutputError(f"The folder {folder} holds files that are no report; choose another place with --out.")
     nearest = next(place for place in folder.absolute().parents if place.exists())
     with _aside(nearest / folder.name) as aside:  # tried where a folder is already: nothing is left if the run fails
         aside.rmdir()
+
+
+def _holds_something_else(folder: Path) -> bool:
+    try:
+        return any(folder.iterdir()) and not (folder / "report.json").is_file()
+    except OSError as err:
+        raise OutputError(
+            f"The folder {folder} cannot be read ({err.strerror or err}); choose another place with --out."
+        ) from err
 
 
 @contextmanager

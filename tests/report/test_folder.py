@@ -1,5 +1,6 @@
 """A report folder appears whole or not at all."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -74,6 +75,18 @@ def test_unwritable_place_is_one_sentence(bare: ReportInputs, tmp_path: Path) ->
         check_target(tmp_path / "file" / "out")
     with pytest.raises(OutputError, match=r"cannot be written"):
         write_folder(bare, tmp_path / "file" / "out")
+
+
+def test_a_folder_that_cannot_be_listed_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Like one without permission to read it, which root would be shown all the same."""
+
+    def refuse(_: Path) -> Iterator[Path]:
+        raise PermissionError(13, "Permission denied")
+
+    (tmp_path / "out").mkdir()
+    monkeypatch.setattr(Path, "iterdir", refuse)
+    with pytest.raises(OutputError, match=r"cannot be read \(Permission denied\); choose another place"):
+        check_target(tmp_path / "out")
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError("disk full")])
