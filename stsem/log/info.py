@@ -49,7 +49,7 @@ class LogInfo:
     """A log as a whole.
 
     Args:
-        name: of the file or folder, without extension.
+        name: of the file without its extension, or of the folder; of several files, of the first in order of names.
         paths: of its files, in order.
         sha256: of all bytes of all files, in order; for one file the file's own.
         size_bytes: of all files.

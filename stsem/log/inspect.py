@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.frame import Depth
+from stsem.log.info import ChannelInfo
 from stsem.log.log import Log
 from stsem.log.plan import NEEDS
 
@@ -74,11 +75,24 @@ class FramesSummary:
 
 
 @dataclass(frozen=True)
+class FileSummary:
+    """The log as a whole: its name, the names of its files, and the rest as in `LogInfo`."""
+
+    name: str
+    files: tuple[str, ...]
+    sha256: str
+    size_bytes: int
+    duration_s: float
+    profile: str
+    library: str
+
+
+@dataclass(frozen=True)
 class Inspection:
     """Everything `stsem inspect` shows; `as_dict` is the same as JSON-able data."""
 
-    log: dict[str, object]
-    channels: tuple[dict[str, object], ...]
+    log: FileSummary
+    channels: tuple[ChannelInfo, ...]
     used: dict[str, str | None]
     frames: FramesSummary
     truth: TruthSummary | None
@@ -99,12 +113,11 @@ def inspect_log(log: Log, *, full: bool = False) -> Inspection:
     seen = _look(log, indices)
     info = log.info
     return Inspection(
-        log={
-            "name": info.name, "files": [path.name for path in info.paths], "sha256": info.sha256,
-            "size_bytes": info.size_bytes, "duration_s": info.duration_s, "profile": info.profile,
-            "library": info.library,
-        },
-        channels=tuple(asdict(channel) for channel in info.channels),
+        log=FileSummary(
+            name=info.name, files=tuple(path.name for path in info.paths), sha256=info.sha256,
+            size_bytes=info.size_bytes, duration_s=info.duration_s, profile=info.profile, library=info.library,
+        ),
+        channels=info.channels,
         used=asdict(info.choice),
         frames=_frames(log, seen),
         truth=_truth(log.classes, seen) if log.classes else None,
