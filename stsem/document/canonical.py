@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import os
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from pydantic import JsonValue, ValidationError
 
 from stsem.document.part import plain
 from stsem.document.schema import SCHEMA_VERSION, Document
-from stsem.errors import OutputError, UsageError
+from stsem.errors import UsageError
 
 OUTSIDE_DIGEST = ("host", "digest")
 """Top-level keys that the digest leaves out."""
@@ -73,22 +72,6 @@ def sealed(document: Document) -> Document:
 def to_bytes(document: Document) -> bytes:
     """report.json."""
     return canonical(as_json(document))
-
-
-def write_document(document: Document, path: Path) -> None:
-    """Write report.json beside `path` and rename it, so that no reader ever sees half a report.
-
-    Raises:
-        OutputError: the folder or the file cannot be written.
-    """
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        aside.write_bytes(to_bytes(document))
-        aside.replace(path)
-    except OSError as err:
-        raise OutputError(f"The report {path} cannot be written ({err.strerror}); choose another place.") from err
-    finally:
-        aside.unlink(missing_ok=True)
 
 
 def read_document(path: Path) -> Document:

@@ -2,10 +2,8 @@
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from stsem.classes import NO_LABEL, Labels
-from stsem.frame import Segmentation
 from stsem.geometry.homography import Matrix3
 
 
@@ -19,18 +17,6 @@ def warp_labels(labels: Labels, H: Matrix3, size: tuple[int, int]) -> Labels:
     """
     warped = cv2.warpPerspective(labels, H, size, flags=cv2.INTER_NEAREST, borderValue=NO_LABEL)
     return np.asarray(warped, np.uint8)
-
-
-def warp_confidence(confidence: npt.NDArray[np.float32], H: Matrix3, size: tuple[int, int]) -> npt.NDArray[np.float32]:
-    """Confidence (H, W) float32 fetched like the labels; 0 where the keyframe does not reach."""
-    warped = cv2.warpPerspective(confidence, H, size, flags=cv2.INTER_NEAREST, borderValue=0)
-    return np.asarray(warped, np.float32)
-
-
-def warp_segmentation(source: Segmentation, H: Matrix3, size: tuple[int, int]) -> Segmentation:
-    """Labels and, if there is one, confidence of a keyframe as seen from the current frame; see `warp_labels`."""
-    confidence = None if source.confidence is None else warp_confidence(source.confidence, H, size)
-    return Segmentation(warp_labels(source.labels, H, size), confidence)
 
 
 def warp_onto(background: Labels, labels: Labels, H: Matrix3) -> Labels:

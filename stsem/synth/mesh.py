@@ -45,15 +45,6 @@ class Quads:
         return np.ascontiguousarray(np.stack([c[:, [0, 1, 2]], c[:, [0, 2, 3]]], 1).reshape(-1, 3, 3))
 
 
-def concatenated(parts: list[Quads]) -> Quads:
-    """One bag of several; order is kept."""
-    return Quads(
-        np.concatenate([p.corners for p in parts]), np.concatenate([p.normals for p in parts]),
-        np.concatenate([p.uv for p in parts]), np.concatenate([p.material for p in parts]),
-        np.concatenate([p.label for p in parts]),
-    )  # fmt: skip
-
-
 @dataclass
 class _Lists:
     corners: list[F64] = field(default_factory=list)

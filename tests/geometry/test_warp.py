@@ -6,9 +6,8 @@ import pytest
 
 from stsem.chance import generator
 from stsem.classes import NO_LABEL
-from stsem.frame import Segmentation
 from stsem.geometry.homography import is_sane
-from stsem.geometry.warp import warp_confidence, warp_labels, warp_segmentation
+from stsem.geometry.warp import warp_labels
 
 SIZE = (96, 64)
 LABELS = generator(0, "labels").integers(0, 13, (64, 96)).astype(np.uint8)
@@ -76,14 +75,3 @@ def test_the_current_frame_may_have_another_size() -> None:
     warped = warp_labels(LABELS, double, (192, 128))
     assert warped.shape == (128, 192)
     np.testing.assert_array_equal(warped[::2, ::2], LABELS)
-
-
-def test_confidence_travels_with_its_label_and_is_zero_outside() -> None:
-    confidence = generator(0, "confidence").random((64, 96), np.float32) + np.float32(0.01)
-    warped = warp_segmentation(Segmentation(LABELS, confidence), shifted(-7, 3), SIZE)
-    assert warped.confidence is not None
-    assert warped.confidence.dtype == np.float32
-    np.testing.assert_array_equal(warped.confidence == 0, warped.labels == NO_LABEL)
-    np.testing.assert_array_equal(warped.confidence[3:, :-7], confidence[:-3, 7:])
-    np.testing.assert_array_equal(warped.confidence, warp_confidence(confidence, shifted(-7, 3), SIZE))
-    assert warp_segmentation(Segmentation(LABELS), np.eye(3), SIZE).confidence is None
