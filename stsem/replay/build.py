@@ -21,7 +21,7 @@ from stsem.replay.modes import Mode
 from stsem.stages.propagate import PROPAGATIONS
 from stsem.stages.register import Register
 from stsem.stages.segment import NetworkSegmenter, OracleSegmenter, Segmenter
-from stsem.stages.select import parse_policy
+from stsem.stages.select import KeyframePolicy, parse_policy
 
 NETWORK_THREADS = 2
 """Threads of the network on two or more simulated cores; its output does not depend on them."""
@@ -67,14 +67,21 @@ def build_rule(mode: Mode, segmenter: Segmenter, config: RunConfig, times: Stage
     """The steps of `mode`, with a memory of their own."""
     if mode.segments_every_frame:
         return AnswerRule(segmenter, None)
-    policy = parse_policy(
-        config.keyframes, rotation=config.keyframe_rotation, translation=config.keyframe_translation,
-        time_ns=round(config.keyframe_time_s * 1e9),
-    )  # fmt: skip
+    policy = policy_of(config)
     method = PROPAGATIONS[config.propagation]()
     needed = policy.needs_homography or method.needs_homography
     register = TimedRegister(Register(config.seed), times) if needed else None
     return AnswerRule(segmenter, Prediction(policy, TimedPropagation(method, times), register))
+
+
+def policy_of(config: RunConfig) -> KeyframePolicy:
+    """The keyframe policy with its numbers."""
+    return parse_policy(
+        config.keyframes,
+        rotation=config.keyframe_rotation,
+        translation=config.keyframe_translation,
+        time_ns=round(config.keyframe_time_s * 1e9),
+    )
 
 
 def truth_frames(log: Log) -> frozenset[int]:

@@ -9,6 +9,7 @@ from stsem.classes import Labels
 from stsem.frame import Frame, Image
 from stsem.inference.threads import set_threads
 from stsem.log.log import Log
+from stsem.log.plan import NEEDS
 from stsem.replay.build import NETWORK_THREADS, Model
 from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTimes
@@ -73,7 +74,7 @@ def replay_log(
     began = hostclock.wall_ns()
     set_threads(1)
     fused, times = can_map(log, config), StageTimes()
-    roles = frozenset({"depth", "pose"}) if fused else frozenset()
+    roles = NEEDS if fused else frozenset()
     slots = schedule(log.plans, config.exact_rate, frozenset(), roles)
     segmenter = model.segmenter(min(NETWORK_THREADS, config.cores), times)
     setup = Setup(config, model, segmenter, costs_of, slots, _pictured(slots), fused, times)

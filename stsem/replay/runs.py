@@ -8,6 +8,7 @@ from stsem.document.accuracy import Coverage, Loss
 from stsem.document.schema import MapScore, Run, TrajectoryScore
 from stsem.document.timing import Latency, Throughput
 from stsem.log.log import Log
+from stsem.log.plan import NEEDS
 from stsem.metrics.latency import latency
 from stsem.metrics.loss import split
 from stsem.metrics.outcomes import count_outcomes
@@ -160,11 +161,7 @@ def _disabled(context: Context, run: ModeRun, record: Record) -> dict[str, int]:
     if run.cloud is None:
         return {}
     plans = {plan.index: plan for plan in context.log.plans}
-    lacking = sum(
-        bool(plans[r.index].missing(frozenset({"depth", "pose"})))
-        for r in record.results
-        if r.outcome is Outcome.SEGMENTED
-    )
+    lacking = sum(bool(plans[r.index].missing(NEEDS)) for r in record.results if r.outcome is Outcome.SEGMENTED)
     return {"fuse": lacking} if lacking else {}
 
 

@@ -6,12 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 
-from stsem import chance
 from stsem.frame import Frame, Segmentation
 from stsem.geometry.features import Features, extract
 from stsem.geometry.homography import Homography, estimate
 from stsem.log.log import Loaded, Log
+from stsem.log.plan import NEEDS
 from stsem.replay.answer import AnswerRule, Prediction
+from stsem.replay.build import policy_of
 from stsem.replay.config import RunConfig
 from stsem.replay.lanes import CostsOf
 from stsem.replay.modes import Mode
@@ -21,8 +22,7 @@ from stsem.replay.schedule import Slot, horizon_ns, schedule
 from stsem.result import FrameResult
 from stsem.stages.keyframe import Keyframe
 from stsem.stages.propagate import PROPAGATIONS
-from stsem.stages.register import Registration
-from stsem.stages.select import parse_policy
+from stsem.stages.register import Registration, pair_seed
 
 _NOTHING = Segmentation(np.zeros((1, 1), np.uint8))
 
@@ -71,7 +71,7 @@ class _RememberedRegister:
             return Registration(own, None)
         pair = keyframe_index, frame.index
         if pair not in self.pairs:
-            self.pairs[pair] = estimate(keyframe, own, seed=chance.hash31(self.seed, "register", *pair))
+            self.pairs[pair] = estimate(keyframe, own, seed=pair_seed(self.seed, *pair))
         return Registration(own, self.pairs[pair])
 
 
@@ -111,13 +111,8 @@ class Probe:
     ) -> None:
         self._log, self._config, self._costs_of, self._usable = log, config, costs_of, usable
         self._patience_ns = patience_ns
-        self._roles = frozenset({"depth", "pose"}) if fused else frozenset()
-        self._policy = parse_policy(
-            config.keyframes,
-            rotation=config.keyframe_rotation,
-            translation=config.keyframe_translation,
-            time_ns=round(config.keyframe_time_s * 1e9),
-        )
+        self._roles = NEEDS if fused else frozenset()
+        self._policy = policy_of(config)
         self._warps = PROPAGATIONS[config.propagation]().needs_homography
         predicts = any(not mode.segments_every_frame for mode in config.modes)
         looks = predicts and (self._policy.needs_homography or self._warps)

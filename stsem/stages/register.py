@@ -42,5 +42,11 @@ class Register:
         features = extract(frame.image)
         if keyframe is None or keyframe_index is None:
             return Registration(features, None)
-        seed = chance.hash31(self.seed, "register", keyframe_index, frame.index)
-        return Registration(features, estimate(keyframe, features, seed=seed))
+        return Registration(
+            features, estimate(keyframe, features, seed=pair_seed(self.seed, keyframe_index, frame.index))
+        )
+
+
+def pair_seed(seed: int, keyframe_index: int, index: int) -> int:
+    """Seed of the robust estimation between two frames, from the run's: each pair draws for itself."""
+    return chance.hash31(seed, "register", keyframe_index, index)
