@@ -93,8 +93,9 @@ class CostProfile:
         for name, samples in self.samples_ns.items():
             factor = factors.get(name, factors.get(name.rpartition("@")[0], default))
             scaled[name] = tuple(max(1, round(sample * factor)) for sample in samples)
-        words = ", ".join(f"{name} x {factor}" for name, factor in (*sorted(factors.items()), ("all else", default)))
-        return CostProfile(f"{self.machine}, scaled ({words})", scaled, self.disturbed, self.made_for)
+        parts = [f"{name} x {factor}" for name, factor in sorted(factors.items())]
+        words = ", ".join([*parts, f"{'the rest ' if parts else ''}x {default}"])
+        return CostProfile(f"{self.machine}, scaled {words}", scaled, self.disturbed, self.made_for)
 
     def to_bytes(self) -> bytes:
         """The file: JSON, keys sorted, samples ascending, a stage per line; equal profiles have equal bytes."""
