@@ -36,13 +36,12 @@ def report_inputs(context: Context, document: Document, scratch: Path, *, plots:
     )
 
 
-def finish_annotated(annotated: AnnotatedLog, context: Context) -> None:
-    """Add the map and close the file."""
+def annotate_map(annotated: AnnotatedLog, context: Context) -> None:
+    """Add the finished map, shown from the last frame on: before it, it did not exist."""
     clouds = [run.cloud for run in context.replayed.runs if run.cloud is not None]
     if clouds:
         points = clouds[-1].points
         annotated.map(context.replayed.slots[-1].log_stamp_ns, points.xyz, points.labels)
-    annotated.close()
 
 
 def _rows(run: ModeRun, replayed: Replayed) -> list[FrameRow]:

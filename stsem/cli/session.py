@@ -3,6 +3,7 @@
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from stsem import hostclock
 from stsem.cli.console import note, progress
-from stsem.cli.inputs import finish_annotated, report_inputs
+from stsem.cli.inputs import annotate_map, report_inputs
 from stsem.document.canonical import to_bytes
 from stsem.document.difference import first_differences, repeatable_files
 from stsem.document.origin import Host, StageCost
@@ -152,10 +153,10 @@ def _sustainable(session: Session) -> dict[str, Sustainable]:
 def _write(session: Session, out: Path | None, began: Began) -> tuple[Document, Path]:
     with tempfile.TemporaryDirectory(prefix="stsem-") as scratch:
         path = Path(scratch) / "annotated.mcap"
-        annotated = AnnotatedLog(path, session.model.classes) if session.config.annotate else None
-        context = _replay(session, annotated)
-        if annotated is not None:
-            finish_annotated(annotated, context)
+        with AnnotatedLog(path, session.model.classes) if session.config.annotate else nullcontext() as annotated:
+            context = _replay(session, annotated)
+            if annotated is not None:
+                annotate_map(annotated, context)
         document = build_document(context, _host(session, context, began))
         folder = out or REPORTS / session.log.info.name / folder_name(document)
         inputs = report_inputs(context, document, Path(scratch), plots=session.config.plots)
