@@ -229,6 +229,7 @@ def test_every_verb_refuses_alike(cli: Cli, home: Path, tiny_log: Path) -> None:
         (2, "costs", "measure", tiny_log, "--out", "x.json", "--propagation", "magic"),
         (2, "costs", "measure", tiny_log, "--out", "x.json", "--backend", "tensorrt"),
         (2, "synth", "x.mcap", "--size", "big"),
+        (2, "synth", "x.mcap", "--size", "²x32"),
         (2, "nonsense"),
     ):
         ran = cli(*arguments)

@@ -111,7 +111,8 @@ def test_incomplete_frames(delays: list[int], costs: dict[str, int], queue: str,
     assert not {span.frame for span in live.run.spans} & found
     assert live.record.scorecard is not None
     streaming = live.record.scorecard.compute().streaming
-    assert streaming is None or streaming.frames == len(delays)
+    assert streaming is not None
+    assert streaming.frames == len(delays)
 
 
 def test_an_old_frame_never_replaces_a_newer_answer() -> None:
