@@ -1,0 +1,40 @@
+"""What can be chosen is said by --help."""
+
+import re
+import sys
+
+import pytest
+
+from stsem.cli import main
+from stsem.inference.backends import BACKENDS
+from stsem.replay.modes import MODES
+from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.select import POLICIES
+
+CHOICES = {
+    "--mode": list(MODES),
+    "--propagation": list(PROPAGATIONS),
+    "--keyframes": [spelling for spelling, _ in POLICIES.values()],
+    "--backend": list(BACKENDS),
+}
+
+
+@pytest.fixture
+def help_text(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
+    """`stsem-replay --help` on a terminal wide enough for no line to be broken, as plain text."""
+    monkeypatch.setenv("COLUMNS", "400")
+    monkeypatch.setenv("TERMINAL_WIDTH", "400")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setattr(sys, "argv", ["stsem-replay", "--help"])
+    with pytest.raises(SystemExit) as end:
+        main.stsem_replay()
+    assert end.value.code in (0, None)
+    return re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("option", list(CHOICES))
+def test_every_choice_is_named_beside_its_option(help_text: str, option: str) -> None:
+    (line,) = (line for line in help_text.splitlines() if re.match(rf"\W*{option}(?!\S)", line))
+    named = set(re.findall(r"[\w:-]+", line.partition(option)[2]))
+    assert CHOICES[option]
+    assert set(CHOICES[option]) <= named
