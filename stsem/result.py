@@ -5,11 +5,11 @@ from enum import StrEnum
 
 from stsem.classes import Labels
 
-STAGES = ("decode", "register", "segment", "propagate", "fuse")
+STAGES: tuple[str, ...] = ("decode", "register", "segment", "propagate", "fuse")
 """Every stage that can hold a core, in pipeline order: among jobs of one frame the earlier stage goes first, and
 tables, columns and pictures follow the same order. `decode` is a job only where `--count-decode` makes it one."""
 
-ANSWER_STAGES = ("decode", "register", "segment", "propagate")
+ANSWER_STAGES: tuple[str, ...] = tuple(stage for stage in STAGES if stage != "fuse")
 """Stages between taking a frame and answering it; `fuse` works beside them. In pipeline order."""
 
 

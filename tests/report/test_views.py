@@ -19,8 +19,9 @@ from stsem.report.inputs import FrameRow, ReportInputs
 from stsem.report.markdown import markdown
 from stsem.report.outline import Section, Table
 from stsem.report.plots.gallery import Picture, draw_all
+from stsem.report.plots.style import STAGE_COLOURS, UNKNOWN_STAGE
 from stsem.report.terminal import closing_table
-from stsem.result import FrameResult, Outcome
+from stsem.result import STAGES, FrameResult, Outcome
 
 VARIANTS = {"full": {}, "no truth": {"truth": False}, "lossy": {"lossy": True}, "offline": {"clock": False}}
 
@@ -248,3 +249,8 @@ def test_png_has_no_date(written: Path) -> None:
 def test_pictures_are_left_out_where_there_is_nothing_to_show() -> None:
     assert list(draw_all(example(truth=False))) == ["latency", "timeline", "strip"]
     assert "latency" not in draw_all(example(truth=False, clock=False, pictures=False))
+
+
+def test_every_stage_has_a_colour_of_its_own() -> None:
+    assert set(STAGE_COLOURS) == set(STAGES)
+    assert len({*STAGE_COLOURS.values(), UNKNOWN_STAGE}) == len(STAGES) + 1
