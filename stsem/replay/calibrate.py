@@ -82,7 +82,7 @@ def _stages(subject: Subject, frames: list[Frame]) -> Iterator[tuple[str, int, l
         yield "segment", cores, frames, network.infer
     if answer is None:
         raise ValueError("a profile needs the network on at least one number of cores")
-    keyframe = Keyframe(frames[0].index, frames[0].stamp_ns, answer, features)
+    keyframe = Keyframe(frames[0].index, frames[0].stamp_ns, answer)
     last = register(frames[1], features, frames[0].index).homography
     fuse, labels = Fuse(LabelledCloud()), answer
     yield "register", 1, frames, lambda frame: register(frame, features, frames[0].index)

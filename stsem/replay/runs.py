@@ -115,7 +115,9 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
         latency_ms=late,
         throughput=fast,
         trajectory=_trajectory(context),
-        map=None if run.cloud is None else MapScore(points=len(run.cloud), voxels=len(run.cloud)),
+        map=None
+        if run.cloud is None
+        else MapScore(points=len(run.cloud), voxels=len(run.cloud), points_left_out=run.cloud.left_out),
         not_measured=_why_not(context, found),
     )
 
