@@ -1,14 +1,15 @@
 """One pass over a log drives every run of every mode: each frame is read, decoded and segmented once."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 
 from stsem import hostclock
 from stsem.classes import Labels
 from stsem.frame import Frame, Image
 from stsem.inference.threads import set_threads
-from stsem.log.log import Log
+from stsem.log.log import Loaded, Log
 from stsem.log.plan import NEEDS
 from stsem.replay.build import NETWORK_THREADS, Model
 from stsem.replay.config import RunConfig
@@ -77,9 +78,20 @@ def replay_log(
     roles = NEEDS if fused else frozenset()
     slots = schedule(log.plans, config.exact_rate, frozenset(), roles)
     segmenter = model.segmenter(min(NETWORK_THREADS, config.cores), times)
-    setup = Setup(config, model, segmenter, costs_of, slots, _pictured(slots), fused, times)
+    frames_at = partial(_frames, log, model, fused)
+    setup = Setup(
+        config,
+        model,
+        segmenter,
+        costs_of,
+        slots,
+        _pictured(slots),
+        fused,
+        times,
+        lambda index: next(frames_at([index])),
+    )
     lanes = [Lane(setup, mode, _watch_of(mode, watch)) for mode in config.modes]
-    pictures = _feed(log, setup, lanes, progress)
+    pictures = _feed(frames_at, setup, lanes, progress)
     end = horizon_ns(slots, log.period_ns, config.exact_rate)
     runs = tuple(lane.finish(end) for lane in lanes)
     return Replayed(slots, runs, pictures, times.durations_ns, hostclock.wall_ns() - began)
@@ -92,12 +104,21 @@ def can_map(log: Log, config: RunConfig) -> bool:
     return config.map and choice.depth is not None and choice.pose is not None and straight
 
 
-def _feed(log: Log, setup: Setup, lanes: list[Lane], progress: Callable[[int, int], None]) -> tuple[Picture, ...]:
-    """Every frame of the log into every lane."""
-    pictures, model = [], setup.model
+def _frames(log: Log, model: Model, fused: bool, indices: list[int]) -> Generator[Loaded, None, None]:
+    """The frames at `indices` with what this replay looks at."""
     previous = model.network is not None and model.network.has_difference
-    indices = [slot.index for slot in setup.slots]
-    with closing(log.frames(indices, depth=setup.fused, previous=previous, truth=not model.reason)) as frames:
+    return log.frames(indices, depth=fused, previous=previous, truth=not model.reason)
+
+
+def _feed(
+    frames_at: Callable[[list[int]], Generator[Loaded, None, None]],
+    setup: Setup,
+    lanes: list[Lane],
+    progress: Callable[[int, int], None],
+) -> tuple[Picture, ...]:
+    """Every frame of the log into every lane."""
+    pictures, indices = [], [slot.index for slot in setup.slots]
+    with closing(frames_at(indices)) as frames:
         for done, loaded in enumerate(frames, start=1):
             if loaded.index in setup.pictured and loaded.frame is not None:
                 pictures.append(Picture(loaded.index, loaded.frame.image, loaded.truth))

@@ -65,6 +65,7 @@ class Setup:
         pictured: log indices whose answers are kept for pictures.
         fused: whether a map is built.
         times: where wall-clock durations go.
+        reload: loads a frame of the log again.
     """
 
     config: RunConfig
@@ -75,6 +76,7 @@ class Setup:
     pictured: frozenset[int]
     fused: bool
     times: StageTimes = field(default_factory=StageTimes)
+    reload: Callable[[int], Loaded] | None = None
 
 
 class Lane:
@@ -119,6 +121,7 @@ class Lane:
         machine = Machine(
             cores=config.cores, network_cores=min(run.mode.network_cores, config.cores), costs=costs,
             mailbox=Mailbox(capacity, newest_wins), fuse=self._fuse(), count_decode=config.count_decode,
+            reload=setup.reload,
         )  # fmt: skip
         return RealTimeRun(setup.slots, run.rule, machine, run.real_time)
 

@@ -1,7 +1,7 @@
 """One mode on the simulated clock: frames arrive, wait, are taken, answered, or end otherwise (DESIGN 3)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from stsem.classes import Labels
@@ -10,6 +10,7 @@ from stsem.log.log import Loaded
 from stsem.replay.answer import AnswerRule
 from stsem.replay.queues import Mailbox
 from stsem.replay.schedule import Slot, watermarks
+from stsem.replay.waiting import WaitingRoom
 from stsem.result import STAGES, FrameResult, Outcome, Span
 from stsem.sim.cores import CorePool, Job
 from stsem.sim.costs import CostSource
@@ -69,6 +70,7 @@ class Machine:
         mailbox: the queue rule.
         fuse: the map beside the path; None without one.
         count_decode: whether decoding is a job on the path (`--count-decode`); the work itself is done before.
+        reload: loads a frame again that had to wait long; None keeps every waiting frame in memory.
     """
 
     cores: int
@@ -77,11 +79,12 @@ class Machine:
     mailbox: Mailbox
     fuse: Fuser | None = None
     count_decode: bool = False
+    reload: Callable[[int], Loaded] | None = None
 
 
 @dataclass(eq=False)
 class _State:
-    waiting: dict[int, Loaded] = field(default_factory=dict)
+    waiting: WaitingRoom
     task: _Task | None = None
     newest: NewestAnswer | None = None
 
@@ -105,7 +108,7 @@ class RealTimeRun:
         self._queue = EventQueue(min((slot.arrival_ns for slot in slots), default=0))
         self._pool = CorePool(self._queue, machine.cores)
         self._pushed = 0
-        self._state = _State()
+        self._state = _State(WaitingRoom(machine.reload))
 
     @property
     def spans(self) -> tuple[Span, ...]:
@@ -143,7 +146,7 @@ class RealTimeRun:
             self._enqueue(slot, loaded)
 
     def _enqueue(self, slot: Slot, loaded: Loaded) -> None:
-        self._state.waiting[slot.index] = loaded
+        self._state.waiting.put(loaded)
         dropped = self._machine.mailbox.put(slot.index)
         if dropped is not None:
             self._end(self._slot(dropped), self._state.waiting.pop(dropped), Outcome.DROPPED_BUSY)
