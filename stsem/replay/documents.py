@@ -84,13 +84,14 @@ def _state(context: Context, measured: bool) -> tuple[State, tuple[str, ...]]:
 
 def _verdict(context: Context, state: str, measured: bool, reason: str) -> Verdict:
     frames = len(context.replayed.slots)
+    counted = "1 frame" if frames == 1 else f"{frames} frames"
     if state == "invalid":
         return Verdict(exit_code=EXIT_NOTHING_MEASURED, text=f"Nothing was measured: {reason}.")
     with_truth = sum(slot.has_truth for slot in context.replayed.slots)
     accuracy = f"accuracy measured on {with_truth}" if measured else f"accuracy not measured: {reason}"
     if state == "lossy":
-        return Verdict(exit_code=EXIT_LOSSY, text=f"Finished with a damaged log: {frames} frames, {accuracy}.")
-    return Verdict(exit_code=EXIT_FINE, text=f"Finished: {frames} frames, {accuracy}.")
+        return Verdict(exit_code=EXIT_LOSSY, text=f"Finished with a damaged log: {counted}, {accuracy}.")
+    return Verdict(exit_code=EXIT_FINE, text=f"Finished: {counted}, {accuracy}.")
 
 
 def _identity(context: Context) -> Identity:

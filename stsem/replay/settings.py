@@ -48,7 +48,7 @@ def resolve(
     ):
         for key, value in values.items():
             if key not in keys():
-                raise UsageError(f"Unknown key {key!r} in {source}{nearest(key, keys())}.")
+                raise UsageError(f"Unknown key {key!r} in {source}{nearest(key, keys())}")
             merged[key] = _joined(merged.get(key), value)
     return validated(merged)
 
@@ -66,10 +66,10 @@ def validated(values: Mapping[str, Any]) -> RunConfig:
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:
-    """'; did you mean X?' for the valid word that `word` is closest to, or a list of all when none is close."""
+    """The end of a sentence: '; did you mean X?' for the valid word that `word` is closest to, or a list of all when none is close."""
     valid = tuple(valid)
     close = difflib.get_close_matches(word, valid, n=1)
-    return f"; did you mean {close[0]!r}?" if close else f"; the valid ones are {', '.join(sorted(valid))}"
+    return f"; did you mean {close[0]!r}?" if close else f"; the valid ones are {', '.join(sorted(valid))}."
 
 
 def sentence(err: ValidationError) -> str:
@@ -140,6 +140,6 @@ def parse_topics(texts: Iterable[str]) -> dict[str, str]:
         if not equals or not name:
             raise UsageError(f"--topic takes role=topic, such as color=/camera/image, but {text!r} came.")
         if role not in roles:
-            raise UsageError(f"--topic has no role {role!r}{nearest(role, roles)}.")
+            raise UsageError(f"--topic has no role {role!r}{nearest(role, roles)}")
         table[role] = name
     return table
