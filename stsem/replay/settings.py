@@ -66,7 +66,7 @@ def validated(values: Mapping[str, Any]) -> RunConfig:
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:
-    """The end of a sentence: '; did you mean X?' for the valid word that `word` is closest to, or a list of all when none is close."""
+    """The end of a sentence: did you mean the valid word that `word` is closest to, or all when none is close."""
     valid = tuple(valid)
     close = difflib.get_close_matches(word, valid, n=1)
     return f"; did you mean {close[0]!r}?" if close else f"; the valid ones are {', '.join(sorted(valid))}."
