@@ -64,15 +64,23 @@ def _run(body: Callable[[], int | None]) -> int:
         return EXIT_ERROR
     except (typer.Exit, typer.Abort):
         raise
-    except MemoryError:
-        return _say("The memory of this machine is used up; close other programs or take a smaller window.", EXIT_ERROR)
     except Exception as err:  # noqa: BLE001 - the last line of defence: a bug is told in one sentence, too
         if interrupts:  # a library that was being loaded turned Ctrl-C into an error of its own
             return _say(_INTERRUPTED, EXIT_ERROR)
-        what = f"{type(err).__name__}: {err}".replace("\n", " ")
-        return _say(f"This is a defect of stsem, please report it with STSEM_DEBUG=1: {what}.", EXIT_ERROR)
+        return _say(_unexpected(err), EXIT_ERROR)
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def _unexpected(err: Exception) -> str:
+    """What nobody foresaw, in one sentence."""
+    if isinstance(err, MemoryError):
+        return "The memory of this machine is used up; close other programs or take a smaller window."
+    if isinstance(err, OSError):
+        place = f" ({err.filename})" if err.filename else ""
+        return f"The system refused{place}: {err.strerror or err}."
+    what = f"{type(err).__name__}: {err}".replace("\n", " ")
+    return f"This is a defect of stsem, please report it with STSEM_DEBUG=1: {what}."
 
 
 def _say(text: str, code: int) -> int:

@@ -77,7 +77,7 @@ def _depth(found: Inspection) -> str:
 def _warnings(found: Inspection) -> str:
     lines = [f"Note: {warning}" for warning in found.warnings]
     if found.damage["lossy"]:
-        lines.append(f"Damage: {found.damage['counts']}")
+        lines.append(f"Damage: {found.damage_text}")
     return "\n".join(lines)
 
 

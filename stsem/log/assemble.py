@@ -2,10 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from stsem.camera import Camera
-from stsem.errors import ChannelError, DecodeError, UsageError
+from stsem.errors import ChannelError, DecodeError, LogError, UsageError
 from stsem.log import pixels
 from stsem.log.choose import (
     Candidate,
@@ -17,7 +20,7 @@ from stsem.log.choose import (
     nearest_track,
 )
 from stsem.log.classtable import ClassTable, find_table
-from stsem.log.files import Store
+from stsem.log.files import File, Store
 from stsem.log.messages import Kind
 from stsem.log.plan import clock_offset_ns, out_of_range
 from stsem.log.poses import PoseSource, stamped_poses, transform_chain
@@ -67,6 +70,7 @@ def assemble(
 
     Raises:
         UsageError: a value that cannot be.
+        LogError: the files are not parts of one recording.
         ChannelError: no colour images, two cameras with an equal claim, or an asked-for topic that does not fit.
         ClassTableError: a class table that cannot be used.
     """
@@ -78,6 +82,7 @@ def assemble(
     images = [Candidate(channel.track, channel.look()) for channel in channels.values()]
     color = _asked(images, asked, "color") or choose_color(images, tracks)
     result = Assembly(channels[id(color.track)], (0, 0))
+    _refuse_unrelated(scan.files, result.color)
     result.size = _size(result.color)
     others = [c for c in images if c is not color]
     depth = _partner(others, asked, "depth", color, result.warnings)
@@ -92,6 +97,26 @@ def assemble(
     _find_clock_offsets(result)
     _note_troubles(result, tracks)
     return result
+
+
+def _refuse_unrelated(files: Sequence[File], color: ImageChannel) -> None:
+    """Parts of one recording follow each other; files whose colour images interleave in log time are several logs.
+
+    Raises:
+        LogError: they do.
+    """
+    of_file = np.searchsorted([file.base for file in files], color.rows.place, side="right") - 1
+    spans = [
+        (int(times.min()), int(times.max()), file.path.name)
+        for k, file in enumerate(files)
+        if len(times := color.rows.log_ns[of_file == k])
+    ]
+    for (_, end, one), (start, _, other) in pairwise(sorted(spans)):
+        if start < end:
+            raise LogError(
+                f"{one} and {other} hold colour images of the same time, so they are not parts of one recording; "
+                "give them one by one, each from a folder of its own or as a file."
+            )
 
 
 def _asked(images: Sequence[Candidate], asked: Mapping[str, Track], role: str) -> Candidate | None:

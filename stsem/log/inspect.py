@@ -100,6 +100,7 @@ class Inspection:
     camera: dict[str, object] | None
     clock_offsets_ns: dict[str, int]
     damage: dict[str, object]
+    damage_text: str
     warnings: tuple[str, ...]
 
     def as_dict(self) -> dict[str, object]:
@@ -125,6 +126,7 @@ def inspect_log(log: Log, *, full: bool = False) -> Inspection:
         camera=asdict(log.camera) if log.camera else None,
         clock_offsets_ns=info.clock_offsets_ns,
         damage=info.damage.as_dict(),
+        damage_text=str(info.damage),
         warnings=info.warnings,
     )  # fmt: skip
 

@@ -38,7 +38,7 @@ def build_document(context: Context, host: Host) -> Document:
             state_reasons=reasons,
             accuracy_state="measured" if measured else "not measured",
             accuracy_reason=reason,
-            verdict=_verdict(context, state, measured, reason),
+            verdict=_verdict(context, state, max(p.coverage.scored for p in parts) if measured else 0, reason),
             identity=_identity(context),
             input=_input(context, found),
             config=context.config.reported(),
@@ -82,13 +82,12 @@ def _state(context: Context, measured: bool) -> tuple[State, tuple[str, ...]]:
     return ("lossy", (f"The log is damaged: {damage}.",)) if damage.lossy else ("valid", ())
 
 
-def _verdict(context: Context, state: str, measured: bool, reason: str) -> Verdict:
+def _verdict(context: Context, state: str, scored: int, reason: str) -> Verdict:
     frames = len(context.replayed.slots)
     counted = "1 frame" if frames == 1 else f"{frames} frames"
     if state == "invalid":
         return Verdict(exit_code=EXIT_NOTHING_MEASURED, text=f"Nothing was measured: {reason}.")
-    with_truth = sum(slot.has_truth for slot in context.replayed.slots)
-    accuracy = f"accuracy measured on {with_truth}" if measured else f"accuracy not measured: {reason}"
+    accuracy = f"accuracy measured on {scored}" if scored else f"accuracy not measured: {reason}"
     if state == "lossy":
         return Verdict(exit_code=EXIT_LOSSY, text=f"Finished with a damaged log: {counted}, {accuracy}.")
     return Verdict(exit_code=EXIT_FINE, text=f"Finished: {counted}, {accuracy}.")
@@ -162,6 +161,11 @@ def _channels(log: Log) -> dict[str, Channel]:
 
 def _warnings(context: Context) -> tuple[str, ...]:
     found = [*context.log.info.warnings, *context.notes]
+    found += [
+        f"{run.mode.name} answered no frame before its run ended: the jobs last too long for this log."
+        for run in context.replayed.runs
+        if run.real_time is not None and not any(result.outcome.is_answer for result in run.real_time.results)
+    ]
     costing = context.costing
     if costing is not None and costing.profile is not None and costing.profile.disturbed:
         found.append("The cost profile was measured while other work held a core; its durations are too long.")

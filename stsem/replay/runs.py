@@ -227,7 +227,9 @@ def _why_not(context: Context, found: Found) -> dict[str, str]:
     elif not config.sustainable:
         why["throughput.sustainable_hz"] = "not searched for (--sustainable)"
     elif context.sustainable_hz.get(found.run.mode.name) is None:
-        why["throughput.sustainable_hz"] = "at 1/64 of the speed frames drop, or p95 from arrival exceeds the deadline"
+        why["throughput.sustainable_hz"] = (
+            "no rate down to 1/64 of the log's keeps p95 from arrival under the deadline with at most 1 % dropped"
+        )
     if found.run.cloud is None:
         why["map"] = (
             "--map off"

@@ -17,6 +17,7 @@ from typing import Any
 from stsem.errors import CostError, OutputError
 
 SCHEMA = "stsem-costs/1"
+LONGEST_NS = 86_400 * 10**9
 
 
 def key(stage: str, cores: int) -> str:
@@ -206,6 +207,8 @@ def _check_samples(name: str, samples: tuple[int, ...]) -> None:
         raise CostError(f"The key '{name}' is not of the form stage@cores, like 'segment@2'.")
     if not samples or any(type(sample) is not int or sample < 1 for sample in samples):
         raise CostError(f"The samples of '{name}' must be integers of at least 1 ns, and at least one.")
+    if max(samples) > LONGEST_NS:
+        raise CostError(f"The samples of '{name}' reach {max(samples):.2g} ns, but a job lasts a day at most.")
 
 
 def _median(samples: tuple[int, ...]) -> int:

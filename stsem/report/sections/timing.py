@@ -4,7 +4,7 @@ from stsem.document.schema import Document, Run
 from stsem.document.timing import Distribution, Latency, Outcomes, Throughput
 from stsem.report.outline import Block, Column, Figure, Items, Row, Section, Table, Text
 from stsem.report.wording import NONE, count, meaning, number, percent, percentile, plural
-from stsem.result import STAGES
+from stsem.result import ANSWER_STAGES, STAGES
 
 _PERCENTILES = ("p50", "p90", "p95", "p99", "p999")
 _KINDS = ("from_arrival", "from_stamp", "waiting")
@@ -30,7 +30,7 @@ def _latencies(runs: list[Run]) -> Table:
         for run in runs
     ]
     notes = (
-        *(f"The latency of `{run.mode}` contains {', '.join(run.stages_inside)}." for run in runs),
+        *(f"The latency of `{run.mode}` contains {', '.join(run.stages_inside) or 'no stage'}." for run in runs),
         *(f"{kind.replace('_', ' ').capitalize()}: {meaning(Latency, kind)}" for kind in _KINDS),
         "Percentile p = sorted[ceil(p n) - 1], not interpolated; given from 11, 64, 130, 662 and 6636 samples on "
         "(the smaller of frames and distinct samples of the slowest stage's profile), otherwise `n too small`.",
@@ -68,7 +68,7 @@ def _stages(runs: list[Run]) -> Table:
         for run in runs:
             part = run.latency_ms.stages.get(stage) if run.latency_ms else None
             if part and part.service.n:
-                beside = "" if stage in run.stages_inside else " (beside the path)"
+                beside = "" if stage in ANSWER_STAGES else " (beside the path)"
                 rows.append(Row((stage + beside, run.mode, percentile(part.service, "p50"), number(part.service.max),
                                  number(part.service.mean), number(part.waiting.mean), number(part.waiting.max),
                                  count(part.service.n))))  # fmt: skip
