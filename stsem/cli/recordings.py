@@ -4,6 +4,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from stsem.errors import UsageError
+
 _PART = re.compile(r"(.*)_\d+$")
 
 
@@ -12,7 +14,12 @@ def recordings(paths: Sequence[Path]) -> list[tuple[Path, ...]]:
 
     Files of one folder whose names differ only in a trailing `_NUMBER` are one split recording, as ROS 2 recorders
     write them; so is a folder. Everything else is a log of its own.
+
+    Raises:
+        UsageError: a path was given twice.
     """
+    if twice := [path for path in paths if paths.count(path) > 1]:
+        raise UsageError(f"{twice[0]} was given twice; give each log once.")
     groups: dict[Path, list[Path]] = {}
     for path in paths:
         part = _PART.match(path.stem)

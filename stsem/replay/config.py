@@ -131,9 +131,11 @@ class RunConfig(BaseModel):
         return str(value)
 
     @model_validator(mode="after")
-    def _window_is_not_empty(self) -> "RunConfig":
+    def _parts_fit(self) -> "RunConfig":
         if self.end is not None and self.end <= (self.start or 0.0):
             raise ValueError(f"the window ends at {self.end:g} s, not after its start at {self.start or 0.0:g} s")
+        if self.sustainable and self.clock == "offline":
+            raise ValueError("--sustainable needs the simulated clock, but --clock offline was asked for")
         return self
 
     @property
