@@ -20,12 +20,13 @@ from stsem.log.choose import (
     nearest_track,
 )
 from stsem.log.classtable import ClassTable, find_table
-from stsem.log.files import File, Store
-from stsem.log.messages import Kind
+from stsem.log.container.files import File
+from stsem.log.container.store import Store
 from stsem.log.plan import clock_offset_ns, out_of_range
 from stsem.log.poses import PoseSource, stamped_poses, transform_chain
 from stsem.log.reading import ImageChannel
 from stsem.log.scan import Scan
+from stsem.log.schemas.messages import Kind
 from stsem.log.tracks import IMAGES, Track
 
 REGISTERED = ("auto", "yes", "no")

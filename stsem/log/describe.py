@@ -7,9 +7,9 @@ import numpy as np
 
 from stsem.log.assemble import Assembly
 from stsem.log.info import ChannelInfo, Choice, LogInfo
-from stsem.log.messages import Kind
 from stsem.log.poses import is_static
 from stsem.log.scan import Scan
+from stsem.log.schemas.messages import Kind
 from stsem.log.tracks import Track
 
 

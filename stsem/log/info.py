@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from stsem.log.damage import Damage
+from stsem.log.container.damage import Damage
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ from stsem.frame import Depth, Frame, Image
 from stsem.log import pixels
 from stsem.log.assemble import Assembly, assemble
 from stsem.log.classtable import Translator
+from stsem.log.container.files import find_files
+from stsem.log.container.store import Store
 from stsem.log.describe import describe
-from stsem.log.files import Store, find_files
 from stsem.log.info import LogInfo
 from stsem.log.pixels import ImageMessage
 from stsem.log.plan import (

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.frame import Depth, Image
-from stsem.log.messages import CompressedImage, RawImage
+from stsem.log.schemas.messages import CompressedImage, RawImage
 
 ImageMessage = RawImage | CompressedImage
 Array = npt.NDArray[Any]

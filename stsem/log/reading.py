@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from stsem.errors import DecodeError, LogError
-from stsem.log.damage import Damage
-from stsem.log.files import Store
-from stsem.log.messages import CompressedImage, RawImage
+from stsem.log.container.damage import Damage
+from stsem.log.container.store import Store
 from stsem.log.pixels import ImageMessage, Look, look
+from stsem.log.schemas.messages import CompressedImage, RawImage
 from stsem.log.tracks import Track
 
 T = TypeVar("T")

@@ -13,20 +13,12 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, MessageIndex, Metadata, Schema
 
-from stsem.log.container import (
-    FRAME,
-    MAX_ATTACHMENT_BYTES,
-    MESSAGE_HEAD,
-    BrokenChunkError,
-    Chunk,
-    Record,
-    decompress,
-    parse_chunk,
-    read_records,
-)
-from stsem.log.damage import Damage
-from stsem.log.files import CACHE_BYTES, File, Store
-from stsem.log.fingerprint import Fingerprint
+from stsem.log.container.chunk import BrokenChunkError, Chunk, decompress, parse_chunk
+from stsem.log.container.damage import Damage
+from stsem.log.container.files import File
+from stsem.log.container.fingerprint import Fingerprint
+from stsem.log.container.records import FRAME, MAX_ATTACHMENT_BYTES, MESSAGE_HEAD, Record, read_records
+from stsem.log.container.store import CACHE_BYTES, Store
 from stsem.log.tracks import MAX_NS, Track
 
 Progress = Callable[[int, int], None]

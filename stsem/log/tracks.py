@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from mcap.records import Schema
 
-from stsem.log.damage import Damage
-from stsem.log.decode import TABLE, MessageReader, Row, StampReader
-from stsem.log.messages import Calibration, ClassNames, Decoded, Kind, Transform
+from stsem.log.container.damage import Damage
+from stsem.log.schemas.messages import Calibration, ClassNames, Decoded, Kind, Transform
+from stsem.log.schemas.table import TABLE, MessageReader, Row, StampReader
 
 Int64 = npt.NDArray[np.int64]
 Float64 = npt.NDArray[np.float64]

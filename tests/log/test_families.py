@@ -12,9 +12,9 @@ from made_up_logs import BASE_NS, LEVEL, NS, ROS, Link, picture
 from mcap.records import Schema
 
 from stsem.camera import Camera
-from stsem.log import protobuf, ros2
-from stsem.log.decode import TABLE
-from stsem.log.messages import Calibration, ClassNames, Transform
+from stsem.log.schemas import protobuf, ros2
+from stsem.log.schemas.messages import Calibration, ClassNames, Transform
+from stsem.log.schemas.table import TABLE
 
 TEXT = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=20)
 STAMP = st.integers(1, (1 << 31) * NS - 1)

@@ -9,7 +9,8 @@ from made_up_logs import BASE_NS, ROS, Recorder
 from mcap.writer import CompressionType
 
 from stsem.errors import LogError
-from stsem.log.files import Store, find_files
+from stsem.log.container.files import find_files
+from stsem.log.container.store import Store
 from stsem.log.scan import scan
 from stsem.log.tracks import References
 

@@ -8,7 +8,7 @@ import pytest
 from made_up_logs import label_picture, picture, png
 
 from stsem.log import pixels
-from stsem.log.messages import CompressedImage, RawImage
+from stsem.log.schemas.messages import CompressedImage, RawImage
 
 
 def raw(array: np.ndarray, encoding: str, *, padding: int = 0, big_endian: bool = False) -> RawImage:

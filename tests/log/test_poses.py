@@ -5,9 +5,9 @@ import pytest
 from made_up_logs import LEVEL, ROS
 from mcap.records import Schema
 
-from stsem.log.damage import Damage
-from stsem.log.messages import Transform
+from stsem.log.container.damage import Damage
 from stsem.log.poses import MAX_GAP_NS, stamped_poses, transform_chain
+from stsem.log.schemas.messages import Transform
 from stsem.log.tracks import Samples, Track
 from stsem.pose import Pose, from_quaternion, interpolate
 

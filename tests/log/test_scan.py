@@ -12,10 +12,11 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
 
 from stsem.errors import LogError
-from stsem.log.container import BLOCK, FRAME, MAGIC
-from stsem.log.damage import Damage
-from stsem.log.files import Store, find_files
-from stsem.log.fingerprint import Fingerprint
+from stsem.log.container.damage import Damage
+from stsem.log.container.files import find_files
+from stsem.log.container.fingerprint import Fingerprint
+from stsem.log.container.records import BLOCK, FRAME, MAGIC
+from stsem.log.container.store import Store
 from stsem.log.scan import Scan, scan
 
 IMAGE = "sensor_msgs/msg/Image"

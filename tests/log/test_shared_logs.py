@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stsem.log.files import find_files
+from stsem.log.container.files import find_files
 from stsem.log.inspect import inspect_log
 from stsem.log.log import Log, open_log
 from stsem.log.scan import scan

@@ -12,7 +12,7 @@ from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
 from stsem.camera import Camera
-from stsem.log.messages import Calibration, CompressedImage, RawImage, Transform
+from stsem.log.schemas.messages import Calibration, CompressedImage, RawImage, Transform
 
 NS = 1_000_000_000
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5

@@ -12,7 +12,7 @@ from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from stsem.camera import Camera
-from stsem.log.messages import Calibration, ClassNames, CompressedImage, RawImage, Transform
+from stsem.log.schemas.messages import Calibration, ClassNames, CompressedImage, RawImage, Transform
 
 NS = 1_000_000_000
 

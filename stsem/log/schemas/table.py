@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from mcap.records import Schema
 
-from stsem.log import protobuf, ros2
-from stsem.log.messages import Decoded, Kind
+from stsem.log.schemas import protobuf, ros2
+from stsem.log.schemas.messages import Decoded, Kind
 
 StampReader = Callable[[memoryview], int | None]
 MessageReader = Callable[[memoryview], Decoded]

@@ -1,0 +1,1 @@
+"""What messages say: one file of readers per schema family, and the table that names them."""
