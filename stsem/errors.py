@@ -8,6 +8,7 @@
     |-- ClassTableError        1   the class names of a log, a file or a network
     |-- NetworkError           1   an ONNX file, its sidecar, or what it returns
     |-- TrainingError          1   training pairs or a checkpoint
+    |-- ConversionError        1   a data set that cannot become a log
     |-- CostError              1   a cost profile
     |-- OutputError            1   a folder or file that cannot be written
     |-- MissingExtraError      1   an optional dependency that is not installed
@@ -72,6 +73,10 @@ class NetworkError(StsemError):
 
 class TrainingError(StsemError):
     """Training pairs or a checkpoint that cannot be used."""
+
+
+class ConversionError(StsemError):
+    """A data set or a foreign recording that cannot become a log."""
 
 
 class CostError(StsemError):

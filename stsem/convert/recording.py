@@ -1,0 +1,83 @@
+"""What a data set is to stsem: its events in order of time, and what holds for all of them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from stsem.camera import Camera
+from stsem.classes import ClassSet, Labels
+from stsem.frame import Depth, Image
+from stsem.pose import Pose
+
+
+@dataclass(frozen=True, eq=False)
+class ColorEvent:
+    """A colour image: the bytes of a jpeg, png or webp file as they are, or (H, W, 3) uint8 RGB pixels."""
+
+    stamp_ns: int
+    image: bytes | Image
+
+
+@dataclass(frozen=True, eq=False)
+class DepthEvent:
+    """Depth along z in metres, (H, W) float32, NaN unknown, in the depth camera's pixels."""
+
+    stamp_ns: int
+    depth: Depth
+
+
+@dataclass(frozen=True, eq=False)
+class TruthEvent:
+    """Truth (H, W) uint8 in the ids of `Recording.classes`, 255 ignored."""
+
+    stamp_ns: int
+    labels: Labels
+
+
+@dataclass(frozen=True, eq=False)
+class PoseEvent:
+    """T_WC (4, 4): pose of the colour camera's optical frame in the world, metres."""
+
+    stamp_ns: int
+    T_WC: Pose
+
+
+Event = ColorEvent | DepthEvent | TruthEvent | PoseEvent
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a user may state where the data set does not.
+
+    Args:
+        rate_hz: of images without stamps; None: what the data set says about itself, else 30.
+        depth_scale: units of a 16-bit depth image per metre; None: the data set's own.
+        classes_file: class table instead of the data set's own.
+    """
+
+    rate_hz: float | None = None
+    depth_scale: float | None = None
+    classes_file: Path | None = None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A data set, opened.
+
+    Args:
+        events: in ascending order of stamps; read one by one, so that memory stays bounded.
+        count: how many events there will be, for the progress bar.
+        classes: of the truth; None without truth.
+        camera: intrinsics of the colour images; None when unknown.
+        depth_camera: intrinsics of the depth images when they are not pixel for pixel those of colour, else None.
+        T_color_depth: (4, 4) colour camera from depth camera, metres; None with `depth_camera` None.
+        notes: one sentence each, on what was left out or assumed.
+    """
+
+    events: Iterator[Event]
+    count: int
+    classes: ClassSet | None = None
+    camera: Camera | None = None
+    depth_camera: Camera | None = None
+    T_color_depth: Pose | None = None
+    notes: tuple[str, ...] = field(default=())
