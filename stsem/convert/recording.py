@@ -1,6 +1,6 @@
 """What a data set is to stsem: its events in order of time, and what holds for all of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -53,11 +53,13 @@ class Options:
         rate_hz: of images without stamps; None: what the data set says about itself, else 30.
         depth_scale: units of a 16-bit depth image per metre; None: the data set's own.
         classes_file: class table instead of the data set's own.
+        sequence: which one, where a data set holds several recordings; None: the only one.
     """
 
     rate_hz: float | None = None
     depth_scale: float | None = None
     classes_file: Path | None = None
+    sequence: str | None = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,8 @@ class Recording:
         camera: intrinsics of the colour images; None when unknown.
         depth_camera: intrinsics of the depth images when they are not pixel for pixel those of colour, else None.
         T_color_depth: (4, 4) colour camera from depth camera, metres; None with `depth_camera` None.
-        notes: one sentence each, on what was left out or assumed.
+        notes: one sentence each, on what was left out or assumed; complete once the events are read, because
+            only then is it known what could not be decoded.
     """
 
     events: Iterator[Event]
@@ -80,4 +83,4 @@ class Recording:
     camera: Camera | None = None
     depth_camera: Camera | None = None
     T_color_depth: Pose | None = None
-    notes: tuple[str, ...] = field(default=())
+    notes: Sequence[str] = field(default=())
