@@ -1,13 +1,20 @@
 """What a data set is to stsem: its events in order of time, and what holds for all of them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 
 from stsem.camera import Camera
 from stsem.classes import ClassSet, Labels
 from stsem.frame import Depth, Image
 from stsem.pose import Pose
+
+Progress = Callable[[int, int], None]
+"""Called with (done, total), in whatever unit."""
+
+FIRST_STAMP_NS = 1_000_000_000
+"""Stamp of the first image of a set without stamps: a stamp of zero means "not set" in every message format."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +49,20 @@ class PoseEvent:
     T_WC: Pose
 
 
-Event = ColorEvent | DepthEvent | TruthEvent | PoseEvent
+@dataclass(frozen=True)
+class Loss:
+    """Something that should have been an event but cannot be read: counted, and the result is lossy.
+
+    Args:
+        what: the kind of thing, in the plural, and why: "colour images that cannot be decoded".
+        stamp_ns: where it would have stood; None when that is not known.
+    """
+
+    what: str
+    stamp_ns: int | None = None
+
+
+Event = ColorEvent | DepthEvent | TruthEvent | PoseEvent | Loss
 
 
 @dataclass(frozen=True)
@@ -73,8 +93,7 @@ class Recording:
         camera: intrinsics of the colour images; None when unknown.
         depth_camera: intrinsics of the depth images when they are not pixel for pixel those of colour, else None.
         T_color_depth: (4, 4) colour camera from depth camera, metres; None with `depth_camera` None.
-        notes: one sentence each, on what was left out or assumed; complete once the events are read, because
-            only then is it known what could not be decoded.
+        notes: one sentence each, on what was assumed; read after the events. What was lost is a `Loss`.
     """
 
     events: Iterator[Event]
@@ -83,4 +102,24 @@ class Recording:
     camera: Camera | None = None
     depth_camera: Camera | None = None
     T_color_depth: Pose | None = None
-    notes: Sequence[str] = field(default=())
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a conversion wrote.
+
+    Args:
+        messages: topic -> messages written.
+        losses: what was left out -> how often; anything in it makes the conversion lossy (exit code 3).
+        notes: one sentence each, on what was assumed.
+    """
+
+    messages: Mapping[str, int]
+    losses: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def even_stamp_ns(index: int, rate_hz: float) -> int:
+    """Stamp of image `index` of a set without stamps, at a constant rate: rounded once, so that nothing adds up."""
+    return FIRST_STAMP_NS + round(Fraction(index * 10**9) / Fraction(rate_hz))

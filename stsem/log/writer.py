@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
@@ -17,11 +17,13 @@ from mcap.writer import CompressionType, Writer
 from stsem.camera import Camera
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.errors import OutputError
-from stsem.frame import Image
+from stsem.frame import Depth, Image
 from stsem.log import encode
 from stsem.pose import Pose
 
-WORLD, OPTICAL = "world", "camera_optical"
+WORLD, OPTICAL, DEPTH_OPTICAL = "world", "camera_optical", "depth_optical"
+COLOR, DEPTH, LABELS, CALIBRATION, POSE = "/camera/color", "/camera/depth", "/gt/labels", "/camera/calibration", "/pose"
+DEPTH_CALIBRATION, STATIC = "/camera/depth/calibration", "/tf_static"
 _CHUNK_BYTES = 2 << 20
 
 
@@ -30,12 +32,16 @@ class _Encodable(Protocol):
 
 
 _SCHEMAS: dict[str, Any] = {
-    "/camera/color": fox.CompressedImage,
-    "/camera/depth": fox.RawImage,
-    "/gt/labels": fox.RawImage,
-    "/camera/calibration": fox.CameraCalibration,
-    "/pose": fox.PoseInFrame,
+    COLOR: fox.CompressedImage,
+    DEPTH: fox.RawImage,
+    LABELS: fox.RawImage,
+    CALIBRATION: fox.CameraCalibration,
+    POSE: fox.PoseInFrame,
+    DEPTH_CALIBRATION: fox.CameraCalibration,
+    STATIC: fox.FrameTransform,
 }
+RENDERED = (COLOR, DEPTH, LABELS, CALIBRATION, POSE)
+"""Channels of a rendered log, in the order in which they stand in the file."""
 
 
 class LogWriter:
@@ -47,16 +53,23 @@ class LogWriter:
     Args:
         path: the file.
         classes: names and colours; they go into the metadata record `stsem.classes` and the attachment `classes.json`.
+            None: neither is written.
+        declared: channels that are there even without a message; the others appear with their first one.
+
+    Attributes:
+        counts: topic -> messages written.
 
     Raises:
         OutputError: the file cannot be written; a place that cannot be is found out at once.
     """
 
-    def __init__(self, path: Path, classes: ClassSet) -> None:
+    def __init__(self, path: Path, classes: ClassSet | None, declared: Sequence[str] = RENDERED) -> None:
         if path.is_dir():
             raise OutputError(f"The log {path} cannot be written: it is a folder; give the name of a file in it.")
         self._path, self._aside, self._classes = path, path.with_name(f".{path.name}.{os.getpid()}"), classes
-        self._counts = dict.fromkeys(_SCHEMAS, 0)
+        self.counts: dict[str, int] = dict.fromkeys(declared, 0)
+        self._channels: dict[str, int] = {}
+        self._depth_frame = OPTICAL
         self._last_ns = 0
         self._stream: IO[bytes] = self._open()
         self._writer = Writer(
@@ -64,9 +77,11 @@ class LogWriter:
         )
         with self._whole_or_nothing():
             self._writer.start("", "stsem")
-            names = {str(i): name for i, name in enumerate(classes.names)}
-            self._writer.add_metadata("stsem.classes", names)
-            self._channels = {topic: self._register(topic, schema) for topic, schema in _SCHEMAS.items()}
+            if classes is not None:
+                names = {str(i): name for i, name in enumerate(classes.names)}
+                self._writer.add_metadata("stsem.classes", names)
+            for topic in declared:
+                self._register(topic)
 
     def __enter__(self) -> Self:
         return self
@@ -76,40 +91,70 @@ class LogWriter:
             self._discard()
             return
         with self._whole_or_nothing():
-            self._writer.add_attachment(0, self._last_ns, "classes.json", "application/json", self._class_table())
+            if self._classes is not None:
+                table = _class_table(self._classes)
+                self._writer.add_attachment(0, self._last_ns, "classes.json", "application/json", table)
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._stream.close()
             self._aside.replace(self._path)
 
     def color(self, stamp_ns: int, log_ns: int, image: Image) -> None:
         """A colour image (H, W, 3) uint8 RGB, as JPEG."""
-        self._write("/camera/color", stamp_ns, log_ns, encode.jpeg_image(image, stamp_ns, OPTICAL))
+        self._write(COLOR, stamp_ns, log_ns, encode.jpeg_image(image, stamp_ns, OPTICAL))
+
+    def color_pixels(self, stamp_ns: int, log_ns: int, image: Image) -> None:
+        """A colour image (H, W, 3) uint8 RGB, without loss, as PNG."""
+        self._write(COLOR, stamp_ns, log_ns, encode.png_image(image, stamp_ns, OPTICAL))
+
+    def color_file(self, stamp_ns: int, log_ns: int, data: bytes, form: str) -> None:
+        """A colour image as the bytes of its file, untouched; `form` is `jpeg`, `png` or `webp`."""
+        self._write(COLOR, stamp_ns, log_ns, encode.image_file(data, form, stamp_ns, OPTICAL))
 
     def depth(self, stamp_ns: int, log_ns: int, millimetres: npt.NDArray[np.uint16]) -> None:
         """Depth (H, W) uint16 along z, 0 unknown, pixel for pixel that of the colour image."""
-        self._write(
-            "/camera/depth", stamp_ns, log_ns, encode.raw_image(millimetres.astype("<u2"), "16UC1", stamp_ns, OPTICAL)
-        )
+        message = encode.raw_image(millimetres.astype("<u2"), "16UC1", stamp_ns, self._depth_frame)
+        self._write(DEPTH, stamp_ns, log_ns, message)
+
+    def depth_metres(self, stamp_ns: int, log_ns: int, depth: Depth) -> None:
+        """Depth (H, W) float32 metres along z, NaN unknown; as whole millimetres when nothing is lost by that."""
+        millimetres = encode.whole_millimetres(depth)
+        if millimetres is not None:
+            self.depth(stamp_ns, log_ns, millimetres)
+            return
+        message = encode.raw_image(depth.astype("<f4"), "32FC1", stamp_ns, self._depth_frame)
+        self._write(DEPTH, stamp_ns, log_ns, message)
+
+    def depth_camera(self, stamp_ns: int, log_ns: int, camera: Camera, T_color_depth: Pose | None) -> None:
+        """A depth camera of its own: call it before its first image.
+
+        Args:
+            stamp_ns, log_ns: when.
+            camera: its intrinsics.
+            T_color_depth: (4, 4) colour camera from depth camera, metres; None when unknown.
+        """
+        self._depth_frame = DEPTH_OPTICAL
+        message = encode.calibration(camera, stamp_ns, DEPTH_OPTICAL)
+        self._write(DEPTH_CALIBRATION, stamp_ns, log_ns, message)
+        if T_color_depth is not None:
+            transform = fox.FrameTransform(
+                timestamp=encode.timestamp(stamp_ns), parent_frame_id=OPTICAL, child_frame_id=DEPTH_OPTICAL,
+                translation=encode.vector(T_color_depth), rotation=encode.quaternion(T_color_depth),
+            )  # fmt: skip
+            self._write(STATIC, stamp_ns, log_ns, transform)
 
     def labels(self, stamp_ns: int, log_ns: int, labels: Labels) -> None:
         """Truth (H, W) uint8 class ids, 255 ignored."""
-        self._write("/gt/labels", stamp_ns, log_ns, encode.raw_image(labels, "mono8", stamp_ns, OPTICAL))
+        self._write(LABELS, stamp_ns, log_ns, encode.raw_image(labels, "mono8", stamp_ns, OPTICAL))
 
     def calibration(self, stamp_ns: int, log_ns: int, camera: Camera) -> None:
-        """Intrinsics of the colour and the depth image."""
-        K = camera.K.ravel().tolist()
-        message = fox.CameraCalibration(
-            timestamp=encode.timestamp(stamp_ns), frame_id=OPTICAL, width=camera.width, height=camera.height,
-            distortion_model="plumb_bob", D=[0.0] * 5, K=K, R=np.eye(3).ravel().tolist(),
-            P=np.hstack([camera.K, np.zeros((3, 1))]).ravel().tolist(),
-        )  # fmt: skip
-        self._write("/camera/calibration", stamp_ns, log_ns, message)
+        """Intrinsics of the colour image, and of the depth image unless it has a camera of its own."""
+        self._write(CALIBRATION, stamp_ns, log_ns, encode.calibration(camera, stamp_ns, OPTICAL))
 
     def pose(self, stamp_ns: int, log_ns: int, T_WC: Pose) -> None:
         """Pose of the optical frame in the world, metres."""
         pose = fox.Pose(position=encode.vector(T_WC), orientation=encode.quaternion(T_WC))
         stamp = encode.timestamp(stamp_ns)
-        self._write("/pose", stamp_ns, log_ns, fox.PoseInFrame(timestamp=stamp, frame_id=WORLD, pose=pose))
+        self._write(POSE, stamp_ns, log_ns, fox.PoseInFrame(timestamp=stamp, frame_id=WORLD, pose=pose))
 
     def _open(self) -> IO[bytes]:
         try:
@@ -137,22 +182,26 @@ class LogWriter:
     def _unwritable(self, err: OSError) -> OutputError:
         return OutputError(f"The log {self._path} cannot be written: {err.strerror or err}; choose another place.")
 
-    def _register(self, topic: str, schema: Any) -> int:
-        described = schema.get_schema()
+    def _register(self, topic: str) -> None:
+        described = _SCHEMAS[topic].get_schema()
         schema_id = self._writer.register_schema(described.name, described.encoding, described.data)
-        return self._writer.register_channel(topic, MessageEncoding.Protobuf, schema_id)
+        self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.Protobuf, schema_id)
+        self.counts.setdefault(topic, 0)
 
     def _write(self, topic: str, stamp_ns: int, log_ns: int, message: _Encodable) -> None:
         if log_ns < self._last_ns:
             raise ValueError(f"{topic} at {log_ns} ns came after a message at {self._last_ns} ns")
         try:
-            self._writer.add_message(self._channels[topic], log_ns, message.encode(), stamp_ns, self._counts[topic])
+            if topic not in self._channels:
+                self._register(topic)
+            self._writer.add_message(self._channels[topic], log_ns, message.encode(), stamp_ns, self.counts[topic])
         except OSError as err:
             raise self._unwritable(err) from err
-        self._counts[topic] += 1
+        self.counts[topic] += 1
         self._last_ns = log_ns
 
-    def _class_table(self) -> bytes:
-        colours = self._classes.palette()[: len(self._classes)].tolist()
-        table = {"names": list(self._classes.names), "colours": colours, "ignore_id": NO_LABEL}
-        return (json.dumps(table, indent=1) + "\n").encode()
+
+def _class_table(classes: ClassSet) -> bytes:
+    colours = classes.palette()[: len(classes)].tolist()
+    table = {"names": list(classes.names), "colours": colours, "ignore_id": NO_LABEL}
+    return (json.dumps(table, indent=1) + "\n").encode()
