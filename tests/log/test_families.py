@@ -90,7 +90,7 @@ def test_a_zero_stamp_is_no_stamp() -> None:
 def test_camera_info() -> None:
     read = ros2.camera_info(ros_schema("sensor_msgs/msg/CameraInfo"))
     payload = ROS.camera_info(BASE_NS, 640, 480, [500, 0, 320, 0, 501, 240, 0, 0, 1], "optical")
-    camera = Camera(640, 480, 500, 501, 320, 240, (0.0,) * 5, "plumb_bob")
+    camera = Camera(640, 480, 500, 501, 320, 240)
     assert read(memoryview(payload)) == Calibration(BASE_NS, "optical", camera)
     uncalibrated = read(memoryview(ROS.camera_info(BASE_NS, 640, 480, [0] * 9)))
     assert uncalibrated.camera is None

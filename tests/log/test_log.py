@@ -38,7 +38,7 @@ def test_frames_are_what_was_recorded(room_log: Path) -> None:
     with open_log([room_log]) as log:
         assert log.classes is not None
         assert log.classes.names == ("wall", "floor", "door")
-        assert log.camera == Camera(32, 24, 30, 30, 15.5, 11.5, (0.0,) * 5, "plumb_bob")
+        assert log.camera == Camera(32, 24, 30, 30, 15.5, 11.5)
         assert (log.period_ns, log.size, log.info.duration_s) == (PERIOD_NS, (32, 24), 0.5)
         for i, loaded in enumerate(everything(log)):
             assert loaded.error is None
@@ -253,7 +253,7 @@ def test_calibration_of_another_size_is_scaled(recorder: Callable[..., Recorder]
     info = ROS.camera_info(BASE_NS, 64, 48, [60, 0, 31.5, 0, 60, 23.5, 0, 0, 1])
     log.ros("/camera_info", "sensor_msgs/msg/CameraInfo", info, BASE_NS)
     with open_log([log.close()]) as opened:
-        assert opened.camera == Camera(32, 24, 30, 30, 15.5, 11.5, (0.0,) * 5, "plumb_bob")
+        assert opened.camera == Camera(32, 24, 30, 30, 15.5, 11.5)
         assert "/camera_info is for 64x48, the images are 32x24: intrinsics are scaled." in opened.info.warnings
 
 

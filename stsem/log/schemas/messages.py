@@ -44,18 +44,26 @@ class CompressedImage:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Intrinsics of a camera; `camera` is None when the message says that it is uncalibrated (K all zero)."""
+    """Intrinsics of the images as they were sent: after region of interest and binning.
+
+    Args:
+        stamp_ns, frame_id: of the message.
+        camera: of the image as the sensor saw it, with its lens distortion; None when the message says that the camera
+            is uncalibrated (K is zero).
+        rectified: of the image after rectification (the left 3x3 of P), without distortion; None without a P.
+    """
 
     stamp_ns: int | None
     frame_id: str
     camera: Camera | None
+    rectified: Camera | None = None
 
 
 @dataclass(frozen=True)
 class Transform:
     """T_parent_child: maps points of `child` into `parent`, metres; quaternion x, y, z, w.
 
-    A pose has the frame of its header as parent and "" as child.
+    A pose has the frame of its header as parent and, unless it is odometry that names it, "" as child.
     """
 
     stamp_ns: int | None

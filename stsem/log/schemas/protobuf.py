@@ -11,7 +11,7 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[imp
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from stsem.camera import Camera
+from stsem.log.schemas.calibration import Intrinsics, calibration
 from stsem.log.schemas.messages import Calibration, CompressedImage, RawImage, Transform
 
 NS = 1_000_000_000
@@ -106,14 +106,8 @@ def camera_calibration(schema: Schema) -> Callable[[memoryview], Calibration]:
 
     def read(payload: memoryview) -> Calibration:
         message = decode(bytes(payload))
-        k = message.K
-        if len(k) != 9:
-            raise ValueError(f"K has {len(k)} numbers instead of 9")
-        camera = Camera(
-            width=message.width, height=message.height, fx=k[0], fy=k[4], cx=k[2], cy=k[5],
-            distortion=tuple(message.D), model=message.distortion_model,
-        )  # fmt: skip
-        return Calibration(_stamp(message.timestamp), message.frame_id, camera if k[0] and k[4] else None)
+        sensor = Intrinsics(message.width, message.height, message.K, message.D, message.distortion_model, message.P)
+        return calibration(_stamp(message.timestamp), message.frame_id, sensor)
 
     return read
 

@@ -11,7 +11,7 @@ from typing import Any
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from stsem.camera import Camera
+from stsem.log.schemas.calibration import Intrinsics, Readout, calibration
 from stsem.log.schemas.messages import Calibration, ClassNames, CompressedImage, RawImage, Transform
 
 NS = 1_000_000_000
@@ -111,12 +111,12 @@ def camera_info(schema: Schema) -> Callable[[memoryview], Calibration]:
 
     def read(payload: memoryview) -> Calibration:
         message = decode(bytes(payload))
-        k = message.k
-        camera = Camera(
-            width=message.width, height=message.height, fx=k[0], fy=k[4], cx=k[2], cy=k[5],
-            distortion=tuple(message.d), model=message.distortion_model,
-        )  # fmt: skip
-        return Calibration(_stamp(message.header), message.header.frame_id, camera if k[0] and k[4] else None)
+        roi = message.roi
+        readout = Readout((message.binning_x, message.binning_y), (roi.x_offset, roi.y_offset), (roi.width, roi.height))
+        sensor = Intrinsics(
+            message.width, message.height, message.k, message.d, message.distortion_model, message.p, readout
+        )
+        return calibration(_stamp(message.header), message.header.frame_id, sensor)
 
     return read
 
