@@ -181,7 +181,7 @@ def _host(session: Session, context: Context, began: Began) -> Host:
     replayed = context.replayed
     inside = sum(sum(times) for times in replayed.stage_times_ns.values())
     return Host(
-        paths={"log": ", ".join(map(str, session.log.info.paths)), "model": session.config.model,
+        paths={"log": ", ".join(map(str, session.log.info.sources)), "model": session.config.model,
                "costs": session.config.costs},
         command=" ".join(sys.argv),
         machine=hostclock.machine_facts(),

@@ -108,7 +108,7 @@ def _refuse_unrelated(files: Sequence[File], color: ImageChannel) -> None:
     """
     of_file = np.searchsorted([file.base for file in files], color.rows.place, side="right") - 1
     spans = [
-        (int(times.min()), int(times.max()), file.path.name)
+        (int(times.min()), int(times.max()), file.source.name)
         for k, file in enumerate(files)
         if len(times := color.rows.log_ns[of_file == k])
     ]

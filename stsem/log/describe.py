@@ -20,7 +20,7 @@ def describe(paths: Sequence[Path], scan: Scan, assembly: Assembly) -> LogInfo:
     stamps = assembly.color.rows.stamp_ns
     return LogInfo(
         name=log_name(paths),
-        paths=tuple(file.path for file in scan.files),
+        sources=tuple(file.source for file in scan.files),
         sha256=scan.sha256,
         size_bytes=sum(file.size for file in scan.files),
         duration_s=int(stamps[-1] - stamps[0]) / 1e9,

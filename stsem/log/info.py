@@ -1,9 +1,9 @@
 """What a log is, in plain words and numbers."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from stsem.log.container.damage import Damage
+from stsem.log.container.source import Source
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class LogInfo:
 
     Args:
         name: of the file without its extension, or of the folder; of several files, of the first in order of names.
-        paths: of its files, in order.
+        sources: its files, in order.
         sha256: of all bytes of all files, in order; for one file the file's own.
         size_bytes: of all files.
         duration_s: from the first to the last colour stamp of the whole log.
@@ -63,7 +63,7 @@ class LogInfo:
     """
 
     name: str
-    paths: tuple[Path, ...]
+    sources: tuple[Source, ...]
     sha256: str
     size_bytes: int
     duration_s: float

@@ -115,7 +115,7 @@ def inspect_log(log: Log, *, full: bool = False) -> Inspection:
     info = log.info
     return Inspection(
         log=FileSummary(
-            name=info.name, files=tuple(path.name for path in info.paths), sha256=info.sha256,
+            name=info.name, files=tuple(source.name for source in info.sources), sha256=info.sha256,
             size_bytes=info.size_bytes, duration_s=info.duration_s, profile=info.profile, library=info.library,
         ),
         channels=info.channels,

@@ -67,8 +67,11 @@ def scan(files: Sequence[File], progress: Progress | None = None) -> Scan:
     result, total, told = Scan(files, Damage()), sum(file.size for file in files), 0
     with Fingerprint() as fingerprint, ThreadPoolExecutor(1, "stsem-chunk") as worker:
         for file in files:
+            if not file.size and total:  # what a recorder that crashed leaves of its last part
+                result.damage.count("truncated")
+                continue
             one = _FileScan(result, file, worker)
-            for record in read_records(file.path, result.damage, fingerprint):
+            for record in read_records(file.source, result.damage, fingerprint):
                 one.take(record)
                 if progress and fingerprint.bytes_fed >= told + PROGRESS_BYTES:
                     told = fingerprint.bytes_fed

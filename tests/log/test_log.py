@@ -311,7 +311,7 @@ def test_a_split_recording_keeps_its_static_transforms(tmp_path: Path) -> None:
         log.close()
     with open_log([folder]) as split, open_log([whole]) as one:
         assert split.info.name == "run"
-        assert [path.name for path in split.info.paths] == ["run_0.mcap", "run_1.mcap"]
+        assert [source.name for source in split.info.sources] == ["run_0.mcap", "run_1.mcap"]
         assert len(split.plans) == len(one.plans) == 4
         for a, b in zip(everything(split), everything(one), strict=True):
             assert a.frame is not None

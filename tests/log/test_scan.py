@@ -82,7 +82,7 @@ def test_a_split_recording_is_one_log(tmp_path: Path) -> None:
     folder.mkdir()
     paths = [room(folder / f"run_{i}.mcap", frames=i % 3 + 1) for i in (10, 2, 1)]
     result = scanned(folder)
-    assert [file.path.name for file in result.files] == ["run_1.mcap", "run_2.mcap", "run_10.mcap"]
+    assert [file.source.name for file in result.files] == ["run_1.mcap", "run_2.mcap", "run_10.mcap"]
     assert counts(result)["/cam/color/image_raw"] == 2 + 3 + 2
     whole = b"".join(path.read_bytes() for path in reversed(paths))
     assert result.sha256 == hashlib.sha256(whole).hexdigest()

@@ -2,49 +2,99 @@
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from stsem.errors import LogError
+from stsem.log.container.source import Source, is_url, local_file, local_path, unreadable
+
+Given = Path | str
+"""A path, or as a string also an address such as `https://host/run.mcap`."""
+
+_UNFINISHED = (".mcap.active", ".mcap.tmp", ".mcap.part")
+_PACKED = (".mcap.zst", ".mcap.zstd", ".mcap.lz4", ".mcap.gz")
 
 
 @dataclass(frozen=True)
 class File:
-    """A file of a log, its size in bytes, and the place of its first byte in the log."""
+    """A file of a log: where its bytes come from, and the place of its first byte in the log."""
 
-    path: Path
-    size: int
+    source: Source
     base: int
 
+    @property
+    def size(self) -> int:
+        """Its bytes."""
+        return self.source.size
 
-def find_files(paths: Sequence[Path]) -> tuple[File, ...]:
+
+def find_files(paths: Sequence[Given]) -> tuple[File, ...]:
     """The .mcap files that `paths` mean, in natural order of their names: files as they are, folders by what they hold.
+
+    The natural order is also the one that a ROS 2 recorder's metadata.yaml states, which is therefore not read.
 
     Raises:
         LogError: nothing was given, a path does not exist, or a folder holds no recording.
+        MissingExtraError: for an address, when fsspec is not installed.
     """
     if not paths:
         raise LogError("No log was given; give the path of an MCAP recording.")
-    unique = {os.path.realpath(path): path for given in paths for path in _expand(given)}
+    unique = {os.path.realpath(str(s)) if not is_url(str(s)) else str(s): s for given in paths for s in _sources(given)}
     files: list[File] = []
-    for path in sorted(unique.values(), key=_natural):
-        base = files[-1].base + files[-1].size if files else 0
-        files.append(File(path, path.stat().st_size, base))
+    for source in sorted(unique.values(), key=lambda s: (natural(s.name), str(s))):
+        files.append(File(source, files[-1].base + files[-1].size if files else 0))
     return tuple(files)
 
 
-def _expand(path: Path) -> list[Path]:
-    if path.is_dir():
-        inside = [p for p in path.iterdir() if p.suffix.lower() == ".mcap" and p.is_file()]
-        if not inside:
-            raise LogError(f"The folder {path} holds no .mcap file; give a recording or a folder with one.")
-        return inside
-    if not path.exists():
-        raise LogError(f"There is no file {path}; give the path of an MCAP recording.")
-    return [path]
+def left_out(paths: Iterable[Given]) -> list[str]:
+    """A sentence for each file of a folder that looks like a part of the recording, but is not read."""
+    folders = [path for given in paths if not is_url(given) and (path := local_path(given)).is_dir()]
+    return [
+        f"{path.name} was left unfinished by a recorder or a copy and is not read; give it by name if it belongs here."
+        for folder in folders
+        for path in sorted(folder.iterdir())
+        if path.name.lower().endswith(_UNFINISHED)
+    ]
 
 
-def _natural(path: Path) -> tuple[list[tuple[int, str]], str]:
-    parts = re.findall(r"\d+|\D+", path.name)
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], str(path)
+def natural(name: str) -> list[tuple[int, str]]:
+    """Sort key of a name in which numbers count as numbers."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.findall(r"\d{1,18}|\D+", name)]
+
+
+def _sources(given: Given) -> Sequence[Source]:
+    if is_url(given):
+        from stsem.log.container.remote import remote_files
+
+        return remote_files(str(given))
+    path = local_path(given)
+    try:
+        inside = sorted(path.iterdir()) if path.is_dir() else None
+    except (OSError, ValueError) as err:
+        raise unreadable(path, err) from err
+    return [local_file(path)] if inside is None else _of_folder(path, inside)
+
+
+def _of_folder(folder: Path, inside: Sequence[Path]) -> Sequence[Source]:
+    found = [p for p in inside if p.suffix.lower() == ".mcap" and not p.name.startswith("._") and not p.is_dir()]
+    if found:
+        return [local_file(path) for path in found]
+    odd = [p.name for p in inside if p.name.lower().endswith((*_UNFINISHED, *_PACKED))]
+    below = [p.name for p in inside if p.is_dir() and _holds_mcap(p)]
+    if odd:
+        raise LogError(
+            f"The folder {folder} holds no .mcap file, but {odd[0]}; give an unfinished recording by its own path, "
+            "and unpack a packed one first."
+        )
+    if below:
+        names = ", ".join(below[:5]) + (", ..." if len(below) > 5 else "")
+        raise LogError(f"The folder {folder} holds no .mcap file itself; give one of the recordings in it: {names}.")
+    raise LogError(f"The folder {folder} holds no .mcap file; give a recording or a folder with one.")
+
+
+def _holds_mcap(folder: Path) -> bool:
+    try:
+        return any(path.suffix.lower() == ".mcap" for path in folder.iterdir())
+    except OSError:
+        return False

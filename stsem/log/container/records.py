@@ -7,7 +7,6 @@ attachments, of the data section and of the summary. Specification: https://mcap
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import BinaryIO
 
 from mcap.opcode import Opcode
@@ -15,6 +14,7 @@ from mcap.opcode import Opcode
 from stsem.errors import LogError
 from stsem.log.container.damage import Damage
 from stsem.log.container.fingerprint import Fingerprint
+from stsem.log.container.source import Source
 
 MAGIC = b"\x89MCAP0\r\n"
 FRAME = struct.Struct("<BQ")
@@ -47,17 +47,17 @@ class Record:
     in_summary: bool
 
 
-def read_records(path: Path, damage: Damage, fingerprint: Fingerprint) -> Iterator[Record]:
-    """All whole records of `path`, in file order, up to the end or to the place where it can no longer be followed.
+def read_records(source: Source, damage: Damage, fingerprint: Fingerprint) -> Iterator[Record]:
+    """All whole records of `source`, in file order, up to the end or to the place where it can no longer be followed.
 
     Every byte of the file goes through `fingerprint`, also behind such a place.
 
     Raises:
         LogError: the file is missing, empty or not MCAP.
     """
-    with open_file(path) as file:
-        size = path.stat().st_size
-        _check_magic(path, file.read(len(MAGIC)), size)
+    with source.open() as file:
+        size = source.size
+        _check_magic(source, file.read(len(MAGIC)), size)
         fingerprint.restart(MAGIC)
         yield from _walk(file, size, damage, fingerprint)
         while block := file.read(BLOCK):
@@ -132,20 +132,10 @@ def _lost_track(file: BinaryIO, size: int, place: int, damage: Damage) -> None:
         damage.count("unread_byte", n=size - place)
 
 
-def open_file(path: Path) -> BinaryIO:
-    """The file for reading; LogError when that cannot be."""
-    try:
-        return path.open("rb")
-    except FileNotFoundError as err:
-        raise LogError(f"There is no file {path}; give the path of an MCAP recording.") from err
-    except OSError as err:
-        raise LogError(f"{path} cannot be read ({err.strerror}); give a readable MCAP recording.") from err
-
-
-def _check_magic(path: Path, head: bytes, size: int) -> None:
+def _check_magic(source: Source, head: bytes, size: int) -> None:
     if size == 0:
-        raise LogError(f"{path} is empty (0 bytes); give an MCAP recording.")
+        raise LogError(f"{source} is empty (0 bytes); give an MCAP recording.")
     if head != MAGIC:
         came = next((what for begin, what in KNOWN_HEADS.items() if head.startswith(begin)), None)
         came = came or f"something that begins with the bytes {head.hex(' ')}"
-        raise LogError(f"{path} is not an MCAP file but {came}; give an MCAP recording.")
+        raise LogError(f"{source} is not an MCAP file but {came}; give an MCAP recording.")

@@ -1,16 +1,16 @@
 """Random access to the payloads of a log's messages."""
 
 import threading
+from bisect import bisect_right
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
 
 from stsem.errors import LogError
 from stsem.log.container.chunk import BrokenChunkError, Chunk, decompress
 from stsem.log.container.files import File
-from stsem.log.container.records import open_file
+from stsem.log.container.source import changed
 
 CACHE_BYTES = 96 << 20
 
@@ -33,7 +33,8 @@ class Store:
         cache_bytes: int = CACHE_BYTES,
     ) -> None:  # fmt: skip
         self._files, self._chunks, self._limit = files, chunks, cache_bytes
-        self._handles: dict[Path, BinaryIO] = {}
+        self._bases = [file.base for file in files]
+        self._handles: dict[int, BinaryIO] = {}
         self._cache: OrderedDict[int, bytes] = OrderedDict(opened or {})
         self._held = sum(map(len, self._cache.values()))
         self._closed = False
@@ -95,10 +96,10 @@ class Store:
         """`length` bytes of the log from `behind` bytes after `place`."""
         file = self._file(place)
         if self._closed:
-            raise LogError(f"{file.path} was closed; open the log again to read from it.")
-        handle = self._handles.get(file.path)
+            raise LogError(f"{file.source} was closed; open the log again to read from it.")
+        handle = self._handles.get(file.base)
         if handle is None:
-            handle = self._handles[file.path] = open_file(file.path)
+            handle = self._handles[file.base] = file.source.open()
         handle.seek(place - file.base + behind)
         data = handle.read(length)
         if len(data) != length:
@@ -106,7 +107,7 @@ class Store:
         return data
 
     def _file(self, place: int) -> File:
-        return next(file for file in reversed(self._files) if place >= file.base)
+        return self._files[bisect_right(self._bases, place) - 1]
 
     def _changed(self, place: int) -> LogError:
-        return LogError(f"{self._file(place).path} changed while it was being read; run again on a file at rest.")
+        return changed(self._file(place).source)
