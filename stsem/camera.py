@@ -33,8 +33,8 @@ class Camera:
 
     @property
     def is_distorted(self) -> bool:
-        """Whether any distortion coefficient differs from zero."""
-        return any(self.distortion)
+        """Whether straight lines are bent: a coefficient differs from zero, or it is a fisheye with coefficients."""
+        return any(self.distortion) or (self.model == "equidistant" and bool(self.distortion))
 
     def scaled(self, width: int, height: int) -> "Camera":
         """The same camera for an image resized to (`width`, `height`); pixel centres at integers (shift by half)."""
