@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.errors import ClassTableError
+from stsem.plain import plain
 
 NO_LABEL = 255
 """In truth: ignore this pixel. In an answer: no label, which counts as wrong."""
@@ -27,7 +28,7 @@ class ClassSet:
     """Class names; the position of a name is the id used in every label image inside stsem.
 
     Args:
-        names: unique after `normalised`, 1 to 255 of them.
+        names: unique after `normalised`, 1 to 255 of them; what does not print becomes an escape.
         colours: RGB for pictures, one per name; empty means the default palette.
     """
 
@@ -35,6 +36,7 @@ class ClassSet:
     colours: tuple[Colour, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "names", tuple(map(plain, self.names)))
         if not 1 <= len(self.names) <= MAX_CLASSES:
             raise ClassTableError(f"A class table needs 1 to {MAX_CLASSES} names, but {len(self.names)} came.")
         seen: dict[str, str] = {}

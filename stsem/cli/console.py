@@ -5,6 +5,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from stsem.plain import MAX_SENTENCE, plain
+
 Progress = Callable[[int, int], None]
 """Called with (done, total), in whatever unit."""
 
@@ -22,7 +24,7 @@ def progress(label: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
@@ -30,4 +32,4 @@ def progress(label: str) -> Iterator[Progress]:
 
 def note(text: str) -> None:
     """A line on stderr: what is going on, or what to know; never a result."""
-    print(text, file=sys.stderr)
+    print(plain(text, MAX_SENTENCE), file=sys.stderr)

@@ -14,7 +14,7 @@ app = typer.Typer(help="Measure or scale cost profiles.")
 @app.command("measure", help="Measure what every stage costs on this machine, on frames of a log.")
 @verb
 def measure(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="MCAP file or folder.")],
+    log: Annotated[str, typer.Argument(metavar="LOG", help="MCAP file, folder or address.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Where the profile goes.")],
     model: Annotated[str, typer.Option("--model", metavar="NAME|ONNX", help="The network.")] = "default",
     propagation: Annotated[str, typer.Option("--propagation", help="The method between keyframes.")] = "homography",

@@ -16,7 +16,9 @@ HELP = """Say what is in a log, what would be used as what, and what looks wrong
 
 @verb
 def inspect(
-    log: Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP file, or the files of one recording.")],
+    log: Annotated[
+        list[str], typer.Argument(metavar="LOG...", help="MCAP file or address, or the files of one recording.")
+    ],
     topic: Annotated[
         list[str] | None,
         typer.Option("--topic", metavar="ROLE=TOPIC", help="Channel for color, depth, pose or labels."),
@@ -29,11 +31,12 @@ def inspect(
     from stsem.cli.tables import inspection_text
     from stsem.document.canonical import canonical
     from stsem.errors import EXIT_FINE, EXIT_LOSSY
+    from stsem.log.describe import log_name
     from stsem.log.inspect import inspect_log
     from stsem.log.log import open_log
     from stsem.replay.settings import parse_topics
 
-    with progress(f"Reading {log[0].name}") as step:
+    with progress(f"Reading {log_name(log)}") as step:
         opened = open_log(log, topics=parse_topics(topic or []), classes_file=classes, progress=step)
     with opened:
         found = inspect_log(opened)

@@ -10,6 +10,7 @@ from typing import NoReturn, ParamSpec, cast
 import typer
 
 from stsem.errors import EXIT_ERROR, EXIT_FINE, EXIT_USAGE, StsemError
+from stsem.plain import MAX_SENTENCE, plain
 
 P = ParamSpec("P")
 _Misused = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
@@ -84,5 +85,5 @@ def _unexpected(err: Exception) -> str:
 
 
 def _say(text: str, code: int) -> int:
-    print(f"stsem: {text}", file=sys.stderr)
+    print(f"stsem: {plain(text, MAX_SENTENCE)}", file=sys.stderr)
     return code

@@ -1,28 +1,27 @@
-"""Which of the paths on the command line are parts of one recording."""
+"""Which of the paths and addresses on the command line are parts of one recording."""
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
 
 from stsem.errors import UsageError
+from stsem.log.container.source import is_url, without_secrets
 
-_PART = re.compile(r"(.*)_\d+$")
+_PART = re.compile(r"(.*)_\d+(\.mcap)", re.IGNORECASE | re.DOTALL)
 
 
-def recordings(paths: Sequence[Path]) -> list[tuple[Path, ...]]:
-    """Paths grouped into recordings, in the order given.
+def recordings(given: Sequence[str]) -> list[tuple[str, ...]]:
+    """Paths and addresses grouped into recordings, in the order given.
 
     Files of one folder whose names differ only in a trailing `_NUMBER` are one split recording, as ROS 2 recorders
     write them; so is a folder. Everything else is a log of its own.
 
     Raises:
-        UsageError: a path was given twice.
+        UsageError: one was given twice.
     """
-    if twice := [path for path in paths if paths.count(path) > 1]:
-        raise UsageError(f"{twice[0]} was given twice; give each log once.")
-    groups: dict[Path, list[Path]] = {}
-    for path in paths:
-        part = _PART.match(path.stem)
-        split = part is not None and path.suffix == ".mcap" and len(paths) > 1
-        groups.setdefault(path.with_name(part.group(1)) if part and split else path, []).append(path)
+    if twice := [one for one in given if given.count(one) > 1]:
+        raise UsageError(f"{without_secrets(twice[0])} was given twice; give each log once.")
+    groups: dict[str, list[str]] = {}
+    for one in given:
+        part = _PART.fullmatch(without_secrets(one) if is_url(one) else one)
+        groups.setdefault(part.group(1) + part.group(2) if part else one, []).append(one)
     return [tuple(group) for group in groups.values()]

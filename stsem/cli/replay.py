@@ -25,7 +25,9 @@ def _option(*names: str, panel: str, help: str, metavar: str | None = None) -> A
 
 @verb
 def replay(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="MCAP files, or folders of one recording.")],
+    logs: Annotated[
+        list[str], typer.Argument(metavar="LOG...", help="MCAP files, folders of one recording, https:// or s3://.")
+    ],
     mode: Annotated[
         str | None, _option("--mode", panel=_PIPELINE, metavar="MODE,...", help="per-frame, keyframe, both. [both]")
     ] = None,

@@ -17,6 +17,7 @@ from stsem.document.difference import first_differences, repeatable_files
 from stsem.document.origin import Host, StageCost
 from stsem.document.schema import Document
 from stsem.errors import NotRepeatableError, StsemError, UsageError
+from stsem.log.container.source import shown_name, without_secrets
 from stsem.log.describe import log_name
 from stsem.log.log import Log, open_log
 from stsem.replay.build import Model, build_model, truth_frames
@@ -59,7 +60,7 @@ class Session:
     fused: bool
 
 
-def replay_all(recordings: Sequence[tuple[Path, ...]], config: RunConfig) -> int:
+def replay_all(recordings: Sequence[tuple[str, ...]], config: RunConfig) -> int:
     """Replay each recording into a report of its own; returns the largest exit code.
 
     With several recordings an error in one is said, and the others go on.
@@ -70,7 +71,7 @@ def replay_all(recordings: Sequence[tuple[Path, ...]], config: RunConfig) -> int
     return max(_in_turn(paths, config, out) for paths, out in zip(recordings, folders, strict=True))
 
 
-def _in_turn(paths: tuple[Path, ...], config: RunConfig, out: Path | None) -> int:
+def _in_turn(paths: tuple[str, ...], config: RunConfig, out: Path | None) -> int:
     try:
         return _replay_one(paths, config, out)
     except UsageError:
@@ -80,7 +81,7 @@ def _in_turn(paths: tuple[Path, ...], config: RunConfig, out: Path | None) -> in
         return err.exit_code
 
 
-def _folders(recordings: Sequence[tuple[Path, ...]], out: Path | None) -> list[Path | None]:
+def _folders(recordings: Sequence[tuple[str, ...]], out: Path | None) -> list[Path | None]:
     """Where each report goes: `out` itself for one log, else below it by name; None is the default place."""
     if out is None or len(recordings) == 1:
         return [out] * len(recordings)
@@ -92,12 +93,12 @@ def _folders(recordings: Sequence[tuple[Path, ...]], out: Path | None) -> list[P
     return [out / name for name in names]
 
 
-def _replay_one(paths: tuple[Path, ...], config: RunConfig, out: Path | None) -> int:
+def _replay_one(paths: tuple[str, ...], config: RunConfig, out: Path | None) -> int:
     began = Began.now()
     name = log_name(paths)
     check_target(out or REPORTS / name / "report")
     if len(paths) > 1:
-        note(f"Reading {', '.join(path.name for path in paths)} as one recording in parts.")
+        note(f"Reading {', '.join(map(shown_name, paths))} as one recording in parts.")
     with progress(f"Reading {name}") as step:
         log = open_log(
             paths,
@@ -183,7 +184,7 @@ def _host(session: Session, context: Context, began: Began) -> Host:
     return Host(
         paths={"log": ", ".join(map(str, session.log.info.sources)), "model": session.config.model,
                "costs": session.config.costs},
-        command=" ".join(sys.argv),
+        command=" ".join(map(without_secrets, sys.argv)),
         machine=hostclock.machine_facts(),
         started_at=hostclock.utc_now(),
         wall_s=(hostclock.wall_ns() - began.wall_ns) / 1e9,

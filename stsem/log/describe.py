@@ -1,19 +1,23 @@
 """The facts of an opened log: names, channels, what is used as what."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from stsem.log.assemble import Assembly
+from stsem.log.container.files import Given
+from stsem.log.container.source import is_url, local_path, shown_name
 from stsem.log.info import ChannelInfo, Choice, LogInfo
-from stsem.log.poses import is_static
+from stsem.log.poses.tree import is_static
 from stsem.log.scan import Scan
 from stsem.log.schemas.messages import Kind
 from stsem.log.tracks import Track
+from stsem.plain import MAX_NAME, plain
 
 
-def describe(paths: Sequence[Path], scan: Scan, assembly: Assembly) -> LogInfo:
+def describe(paths: Sequence[Given], scan: Scan, assembly: Assembly) -> LogInfo:
     """Everything that can be said without decoding more images."""
     tracks = sorted(scan.tracks.values(), key=lambda track: (track.topic, track.encoding, track.schema))
     roles = _roles(assembly, tracks)
@@ -34,11 +38,22 @@ def describe(paths: Sequence[Path], scan: Scan, assembly: Assembly) -> LogInfo:
     )
 
 
-def log_name(paths: Sequence[Path]) -> str:
-    """Name of the only file or folder; of several files, of the first in order of their names."""
-    first = min(paths, key=lambda path: path.name)
-    resolved = first.resolve()
-    return resolved.name if resolved.is_dir() else first.stem
+def log_name(paths: Sequence[Given]) -> str:
+    """Name of the only file or folder; of several files, of the first in order of their names.
+
+    It becomes the name of a folder, so it holds no separators, nothing that does not print, and never means a parent.
+    """
+    first = min(paths, key=shown_name)
+    name = shown_name(first) if is_url(first) else _local_name(local_path(first))
+    kept = re.sub(r'[/\\:*?"<>|]', "_", plain(name.removesuffix(".mcap").removesuffix(".MCAP")))
+    while len(kept.encode()) > MAX_NAME:
+        kept = kept[:-1]
+    return kept if kept.strip(". ") else "log"
+
+
+def _local_name(path: Path) -> str:
+    resolved = path.resolve()
+    return resolved.name if resolved.is_dir() else path.name
 
 
 def _choice(assembly: Assembly) -> Choice:

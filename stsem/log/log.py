@@ -16,7 +16,7 @@ from stsem.frame import Depth, Frame, Image
 from stsem.log import pixels
 from stsem.log.assemble import Assembly, assemble
 from stsem.log.classtable import Translator
-from stsem.log.container.files import find_files
+from stsem.log.container.files import Given, find_files, left_out
 from stsem.log.container.store import Store
 from stsem.log.describe import describe
 from stsem.log.info import LogInfo
@@ -57,7 +57,7 @@ class Loaded:
 
 
 def open_log(
-    paths: Sequence[Path],
+    paths: Sequence[Given],
     *,
     topics: Mapping[str, str] | None = None,
     classes_file: Path | None = None,
@@ -69,7 +69,7 @@ def open_log(
     """Scan a log once and say how its frames are made.
 
     Args:
-        paths: files, or folders of files, of one recording.
+        paths: files, folders of files, or (as strings) addresses, of one recording.
         topics: role (color, depth, pose, labels) -> topic, where the choice by schema and name is not wanted.
         classes_file: class table (JSON or TOML) instead of the log's own.
         depth_registered: whether depth pixels are colour pixels: yes, no, or auto (same size means yes).
@@ -86,6 +86,7 @@ def open_log(
     try:
         assembly = assemble(scanned, store, topics or {}, classes_file, depth_registered)
         rows = window(assembly.color.rows.stamp_ns, start_s, end_s)
+        assembly.warnings += left_out(paths)
         return Log(assembly, describe(paths, scanned, assembly), store, rows)
     except BaseException as err:
         store.close()

@@ -1,6 +1,7 @@
 """An image channel that can be read by row: its references, its decoder, and what to do with its pixels."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
 
 from stsem.errors import DecodeError, LogError
@@ -9,6 +10,7 @@ from stsem.log.container.store import Store
 from stsem.log.pixels import ImageMessage, Look, look
 from stsem.log.schemas.messages import CompressedImage, RawImage
 from stsem.log.tracks import Track
+from stsem.plain import plain
 
 T = TypeVar("T")
 
@@ -41,7 +43,7 @@ class ImageChannel:
             raise
         except Exception as err:  # bytes of a stranger, read by parsers with errors of their own
             self._damage.undecodable(self.topic, place, offset)
-            raise DecodeError(self.topic, int(self.rows.stamp_ns[row]), str(err) or type(err).__name__) from err
+            raise DecodeError(self.topic, int(self.rows.stamp_ns[row]), plain(str(err)) or type(err).__name__) from err
 
     def first(self, convert: Callable[[ImageMessage], T]) -> tuple[int, T] | None:
         """(row, `convert` of it) of the first message that can be decoded; None when there is no such message."""
@@ -55,4 +57,6 @@ class ImageChannel:
     def look(self) -> Look:
         """What the channel holds, told by its first readable message."""
         found = self.first(look)
-        return found[1] if found else Look("unknown", 0, "unreadable", "")
+        if found:
+            return replace(found[1], frame_id=plain(found[1].frame_id), name=plain(found[1].name))
+        return Look("unknown", 0, "unreadable", "")

@@ -20,6 +20,7 @@ from stsem.log.container.fingerprint import Fingerprint
 from stsem.log.container.records import FRAME, MAX_ATTACHMENT_BYTES, MESSAGE_HEAD, Record, read_records
 from stsem.log.container.store import CACHE_BYTES, Store
 from stsem.log.tracks import MAX_NS, Track
+from stsem.plain import plain
 
 Progress = Callable[[int, int], None]
 CHUNKS_AHEAD = 3
@@ -210,7 +211,7 @@ class _FileScan:
         """Profile and library; those of the first file stay."""
         record = Header.read(ReadDataStream(BytesIO(body)))
         if self._file.base == 0:
-            self._result.profile, self._result.library = record.profile, record.library
+            self._result.profile, self._result.library = plain(record.profile), plain(record.library)
 
     def schema(self, body: bytes) -> None:
         """A schema; the first of an id stays."""

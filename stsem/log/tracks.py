@@ -11,6 +11,7 @@ from mcap.records import Schema
 from stsem.log.container.damage import Damage
 from stsem.log.schemas.messages import Calibration, ClassNames, Decoded, Kind, Transform
 from stsem.log.schemas.table import TABLE, MessageReader, Row, StampReader
+from stsem.plain import plain
 
 Int64 = npt.NDArray[np.int64]
 Float64 = npt.NDArray[np.float64]
@@ -76,7 +77,7 @@ class Track:
     """
 
     def __init__(self, topic: str, schema: Schema, encoding: str, damage: Damage) -> None:
-        self.topic, self.schema, self.encoding = topic, schema.name, encoding
+        self.topic, self.schema, self.encoding = plain(topic), plain(schema.name), plain(encoding)
         self.row: Row | None = TABLE.get((encoding, schema.name))
         self.trouble = ""
         self.count = self.unstamped = self.largest_gap_ns = 0
@@ -100,7 +101,7 @@ class Track:
             self.decode = row.reader(schema)
             self._stamp = row.stamp(schema) if row.stamp else None
         except Exception as err:  # noqa: BLE001  a schema is foreign input to three parsers with errors of their own
-            self.trouble = f"the schema of {self.topic} cannot be read ({err or type(err).__name__})"
+            self.trouble = f"the schema of {self.topic} cannot be read ({plain(str(err)) or type(err).__name__})"
             self.row = None
 
     @property
@@ -148,7 +149,9 @@ class Track:
         if isinstance(message, tuple):
             stamps = [plausible(transform.stamp_ns) for transform in message]
             for transform in message:
-                self.transforms.setdefault((transform.parent, transform.child), Samples()).add(transform, log_ns)
+                self.transforms.setdefault((plain(transform.parent), plain(transform.child)), Samples()).add(
+                    transform, log_ns
+                )
             return stamps[0] if stamps else None
         if isinstance(message, Calibration) and [message.camera] != [c.camera for c in self.calibrations[-1:]]:
             self.calibrations.append(message)

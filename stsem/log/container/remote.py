@@ -6,10 +6,9 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO, TypeVar, cast
-from urllib.parse import unquote
 
 from stsem.errors import LogError, MissingExtraError, StsemError
-from stsem.log.container.source import changed, without_secrets
+from stsem.log.container.source import changed, shown_name, without_secrets
 
 T = TypeVar("T")
 
@@ -42,7 +41,7 @@ class RemoteFile:
     @property
     def name(self) -> str:
         """The last part of its path."""
-        return url_name(self.shown)
+        return shown_name(self.shown)
 
     def __str__(self) -> str:
         return self.shown
@@ -156,17 +155,10 @@ def remote_files(url: str) -> list[RemoteFile]:
     paths = _paths(system, path, shown)
     if paths is None:
         return [_file(system, path, shown)]
-    found = sorted(p for p in paths if _bare_path(p).lower().endswith(".mcap"))
+    found = sorted(p for p in paths if without_secrets(p).lower().endswith(".mcap"))
     if not found:
         raise LogError(f"{shown} holds no .mcap file that its server lists; give the address of a recording.")
     return [_file(system, p, _shown(system, p)) for p in found[:MAX_LISTED]]
-
-
-def url_name(shown: str) -> str:
-    """The last part of the path of an address without secrets."""
-    path = shown.split("::")[0].partition("://")[2].rstrip("/")
-    last = path.rpartition("/")[2]
-    return unquote(last) if shown.lower().startswith(_WEB) else last
 
 
 def _system(url: str, shown: str) -> tuple[Any, str]:
@@ -223,10 +215,6 @@ def _version(info: dict[str, Any]) -> str | None:
 
 def _shown(system: Any, path: str) -> str:
     return without_secrets(path if "://" in path else str(system.unstrip_protocol(path)))
-
-
-def _bare_path(path: str) -> str:
-    return without_secrets(path)
 
 
 def _asked(shown: str, ask: Callable[[], T]) -> T:

@@ -102,6 +102,15 @@ def local_path(given: Path | str) -> Path:
     return Path(given)
 
 
+def shown_name(given: Path | str) -> str:
+    """The last part of the path that `given` means, for people: unquoted, without query."""
+    if not is_url(given):
+        return local_path(given).name
+    bare = without_secrets(str(given)).split("::")[0]
+    last = bare.partition("://")[2].rstrip("/").rpartition("/")[2]
+    return unquote(last) if bare.lower().startswith("http") else last
+
+
 def without_secrets(text: str) -> str:
     """`text` without `user:password@`, query and fragment if it is an address; other texts as they are."""
     return "::".join(map(_bare, text.split("::"))) if is_url(text) else text
