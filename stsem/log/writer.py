@@ -1,30 +1,26 @@
 """Our own logs: the foxglove schemas, depth and labels as raw images in zstd chunks (DESIGN 10)."""
 
 import json
-import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
 from foxglove import messages as fox
 from mcap.well_known import MessageEncoding
-from mcap.writer import CompressionType, Writer
 
 from stsem.camera import Camera
 from stsem.classes import NO_LABEL, ClassSet, Labels
-from stsem.errors import OutputError
 from stsem.frame import Depth, Image
 from stsem.log import encode
+from stsem.log.mcapfile import McapFile
 from stsem.pose import Pose
 
 WORLD, OPTICAL, DEPTH_OPTICAL = "world", "camera_optical", "depth_optical"
 COLOR, DEPTH, LABELS, CALIBRATION, POSE = "/camera/color", "/camera/depth", "/gt/labels", "/camera/calibration", "/pose"
 DEPTH_CALIBRATION, STATIC = "/camera/depth/calibration", "/tf_static"
-_CHUNK_BYTES = 2 << 20
 
 
 class _Encodable(Protocol):
@@ -56,47 +52,31 @@ class LogWriter:
             None: neither is written.
         declared: channels that are there even without a message; the others appear with their first one.
 
-    Attributes:
-        counts: topic -> messages written.
-
     Raises:
         OutputError: the file cannot be written; a place that cannot be is found out at once.
     """
 
     def __init__(self, path: Path, classes: ClassSet | None, declared: Sequence[str] = RENDERED) -> None:
-        if path.is_dir():
-            raise OutputError(f"The log {path} cannot be written: it is a folder; give the name of a file in it.")
-        self._path, self._aside, self._classes = path, path.with_name(f".{path.name}.{os.getpid()}"), classes
-        self.counts: dict[str, int] = dict.fromkeys(declared, 0)
+        self._classes, self._depth_frame = classes, OPTICAL
         self._channels: dict[str, int] = {}
-        self._depth_frame = OPTICAL
-        self._last_ns = 0
-        self._stream: IO[bytes] = self._open()
-        self._writer = Writer(
-            self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
-        )
-        with self._whole_or_nothing():
-            self._writer.start("", "stsem")
-            if classes is not None:
-                names = {str(i): name for i, name in enumerate(classes.names)}
-                self._writer.add_metadata("stsem.classes", names)
-            for topic in declared:
-                self._register(topic)
+        self._file = McapFile(path)
+        if classes is not None:
+            self._file.metadata("stsem.classes", {str(i): name for i, name in enumerate(classes.names)})
+        for topic in declared:
+            self._register(topic)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Topic -> messages written so far."""
+        return self._file.counts
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
-        if kind is not None:
-            self._discard()
-            return
-        with self._whole_or_nothing():
-            if self._classes is not None:
-                table = _class_table(self._classes)
-                self._writer.add_attachment(0, self._last_ns, "classes.json", "application/json", table)
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._stream.close()
-            self._aside.replace(self._path)
+        if kind is None and self._classes is not None:
+            self._file.attachment("classes.json", "application/json", _class_table(self._classes))
+        self._file.__exit__(kind, error, tb)
 
     def color(self, stamp_ns: int, log_ns: int, image: Image) -> None:
         """A colour image (H, W, 3) uint8 RGB, as JPEG."""
@@ -156,49 +136,17 @@ class LogWriter:
         stamp = encode.timestamp(stamp_ns)
         self._write(POSE, stamp_ns, log_ns, fox.PoseInFrame(timestamp=stamp, frame_id=WORLD, pose=pose))
 
-    def _open(self) -> IO[bytes]:
-        try:
-            return self._aside.open("wb")
-        except OSError as err:
-            raise self._unwritable(err) from err
-
-    @contextmanager
-    def _whole_or_nothing(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as err:
-            self._discard()
-            raise self._unwritable(err) from err
-        except BaseException:
-            self._discard()
-            raise
-
-    def _discard(self) -> None:
-        """Closing flushes, which fails once more on a full disk."""
-        with suppress(OSError):
-            self._stream.close()
-        self._aside.unlink(missing_ok=True)
-
-    def _unwritable(self, err: OSError) -> OutputError:
-        return OutputError(f"The log {self._path} cannot be written: {err.strerror or err}; choose another place.")
-
     def _register(self, topic: str) -> None:
         described = _SCHEMAS[topic].get_schema()
-        schema_id = self._writer.register_schema(described.name, described.encoding, described.data)
-        self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.Protobuf, schema_id)
-        self.counts.setdefault(topic, 0)
+        schema = self._file.schema(described.name, described.encoding, described.data)
+        self._channels[topic] = self._file.channel(topic, schema, MessageEncoding.Protobuf)
 
     def _write(self, topic: str, stamp_ns: int, log_ns: int, message: _Encodable) -> None:
-        if log_ns < self._last_ns:
-            raise ValueError(f"{topic} at {log_ns} ns came after a message at {self._last_ns} ns")
-        try:
-            if topic not in self._channels:
-                self._register(topic)
-            self._writer.add_message(self._channels[topic], log_ns, message.encode(), stamp_ns, self.counts[topic])
-        except OSError as err:
-            raise self._unwritable(err) from err
-        self.counts[topic] += 1
-        self._last_ns = log_ns
+        if log_ns < self._file.last_ns:
+            raise ValueError(f"{topic} at {log_ns} ns came after a message at {self._file.last_ns} ns")
+        if topic not in self._channels:
+            self._register(topic)
+        self._file.message(self._channels[topic], log_ns, stamp_ns, message.encode(), self.counts[topic])
 
 
 def _class_table(classes: ClassSet) -> bytes:
