@@ -16,14 +16,14 @@ from stsem.log.choose import (
     choose_calibration,
     choose_color,
     choose_partner,
-    choose_pose,
     nearest_track,
 )
 from stsem.log.classtable import ClassTable, find_table
 from stsem.log.container.files import File
 from stsem.log.container.store import Store
 from stsem.log.plan import clock_offset_ns, out_of_range
-from stsem.log.poses import PoseSource, stamped_poses, transform_chain
+from stsem.log.poses.find import find_poses
+from stsem.log.poses.source import PoseSource
 from stsem.log.reading import ImageChannel
 from stsem.log.scan import Scan
 from stsem.log.schemas.messages import Kind
@@ -94,7 +94,8 @@ def assemble(
         result.labels = channels[id(labels.track)]
     _find_classes(result, scan, classes_file)
     _find_camera(result, tracks, color)
-    _find_poses(result, tracks, asked.get("pose"), color.look.frame_id)
+    result.poses, warnings = find_poses(tracks, asked.get("pose"), color.look.frame_id, result.color.rows.stamp_ns)
+    result.warnings += warnings
     _find_clock_offsets(result)
     _note_troubles(result, tracks)
     return result
@@ -231,19 +232,6 @@ def _find_camera(result: Assembly, tracks: Sequence[Track], color: Candidate) ->
             f"{track.topic} states lens distortion ({camera.model or 'no model'}), which is not undone."
         )
     result.camera = camera
-
-
-def _find_poses(result: Assembly, tracks: Sequence[Track], asked: Track | None, frame_id: str) -> None:
-    """The chain of transforms if it reaches the camera, else the channel of stamped poses; or what was asked for."""
-    transforms = [t for t in tracks if t.kind is Kind.TRANSFORMS and t.transforms]
-    if transforms and (asked is None or asked.kind is Kind.TRANSFORMS):
-        result.poses, warnings = transform_chain(transforms, frame_id)
-        result.warnings += warnings
-    if result.poses is None:
-        track, warning = (asked, "") if asked else choose_pose(tracks)
-        if track is not None and track.kind is Kind.POSE:
-            result.poses, warnings = stamped_poses(track)
-            result.warnings += warnings + ([warning] if warning else [])
 
 
 def _note_troubles(result: Assembly, tracks: Sequence[Track]) -> None:

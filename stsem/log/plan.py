@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stsem.errors import UsageError
-from stsem.log.poses import PoseSource
+from stsem.log.poses.source import PoseSource
 from stsem.log.tracks import Int64, References
 
 MAX_DEPTH_OFFSET_NS = 20_000_000
@@ -144,20 +144,24 @@ def make_plans(
 ) -> tuple[FramePlan, ...]:  # fmt: skip
     """Plans of the colour frames `rows`; `offsets` are the clock offsets of colour, depth, pose and labels."""
     color_offset, depth_offset, pose_offset, truth_offset = offsets
-    plans = []
-    for index, row in enumerate(range(*rows.indices(len(color)))):
-        stamp_ns = int(color.stamp_ns[row])
-        pose = poses.at(stamp_ns) if poses else None
-        plans.append(
-            FramePlan(
-                index, stamp_ns, int(color.log_ns[row]) - color_offset,
-                _log(depth, int(partners.depth[row]), depth_offset),
-                None if pose is None else pose.log_ns - pose_offset,
-                _log(truth, int(partners.truth[row]), truth_offset),
-            )
-        )  # fmt: skip
-    return tuple(plans)
+    stamps = color.stamp_ns[rows]
+    times = poses.times(stamps) if poses else None
+    posed = times.known.tolist() if times else [False] * len(stamps)
+    pose_logs = (times.log_ns - pose_offset).tolist() if times else stamps.tolist()
+    columns = zip(
+        stamps.tolist(), (color.log_ns[rows] - color_offset).tolist(),
+        _logs(depth, partners.depth[rows], depth_offset), _logs(truth, partners.truth[rows], truth_offset),
+        posed, pose_logs, strict=True,
+    )  # fmt: skip
+    return tuple(
+        FramePlan(index, stamp_ns, color_log, depth_log, pose_log if has_pose else None, truth_log)
+        for index, (stamp_ns, color_log, depth_log, truth_log, has_pose, pose_log) in enumerate(columns)
+    )
 
 
-def _log(references: References | None, row: int, offset_ns: int) -> int | None:
-    return None if references is None or row < 0 else int(references.log_ns[row]) - offset_ns
+def _logs(references: References | None, rows: Int64, offset_ns: int) -> list[int | None]:
+    """Log times of the partners in `rows`; None for row -1."""
+    if references is None or not len(references):
+        return [None] * len(rows)
+    times = references.log_ns[rows] - offset_ns
+    return [time if row >= 0 else None for row, time in zip(rows.tolist(), times.tolist(), strict=True)]
