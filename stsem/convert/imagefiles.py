@@ -1,0 +1,237 @@
+"""Image files in folders: listed in natural order, read one by one, and nothing outside the source is opened."""
+
+import os
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from stsem.classes import NO_LABEL, ClassSet, Labels
+from stsem.convert.recording import ColorEvent, DepthEvent, Event, Loss, Options, PoseEvent, TruthEvent
+from stsem.errors import ConversionError
+from stsem.frame import Depth
+from stsem.log import classtable, pixels
+from stsem.log.schemas.messages import CompressedImage
+from stsem.pose import Pose
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
+MAX_FILE_BYTES = 256 << 20
+MAX_TEXT_BYTES = 16 << 20
+_LISTED = 8
+_Kind = tuple[str, Callable[["Capture"], Path | None], Callable[[int, bytes], Event]]
+_NUMBER = re.compile(r"(\d+)")
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """What belongs to one colour image: its stamp, the files that lie beside it, its pose T_WC (4, 4)."""
+
+    stamp_ns: int
+    color: Path
+    truth: Path | None = None
+    depth: Path | None = None
+    T_WC: Pose | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Class names, and how raw ids or colours become (H, W) uint8 labels in their order, 255 ignored."""
+
+    classes: ClassSet
+    labels: Callable[[npt.NDArray[Any]], Labels]
+
+
+def natural(name: str) -> tuple[tuple[tuple[bool, int, str], ...], str]:
+    """Sorting key under which frame 9 comes before frame 10, however many zeros they have."""
+    parts = (part for part in _NUMBER.split(name) if part)
+    return tuple((True, int(p), "") if p.isdecimal() else (False, 0, p) for p in parts), name
+
+
+def walk(root: Path, depth: int) -> Iterator[Path]:
+    """Folders under `root`, itself included, at most `depth` levels down, in natural order; links are not followed."""
+    yield root
+    if depth > 0:
+        try:
+            below = sorted((e.name for e in os.scandir(root) if e.is_dir(follow_symlinks=False)), key=natural)
+        except OSError:
+            return
+        for name in below:
+            yield from walk(root / name, depth - 1)
+
+
+def files(folder: Path, suffixes: Collection[str] = IMAGE_SUFFIXES) -> list[Path]:
+    """Files of a folder with one of the `suffixes`, in natural order; empty when it cannot be listed."""
+    try:
+        names = [e.name for e in os.scandir(folder) if e.name.lower().endswith(tuple(suffixes)) and e.is_file()]
+    except OSError:
+        return []
+    return [folder / name for name in sorted(names, key=natural) if not name.startswith(".")]
+
+
+def read_bytes(path: Path, root: Path, limit: int = MAX_FILE_BYTES) -> bytes:
+    """All bytes of a file.
+
+    Raises:
+        ValueError: it is outside `root`, larger than `limit`, no file, or cannot be read.
+    """
+    try:
+        if not path.resolve(strict=True).is_relative_to(root.resolve(strict=True)):
+            raise ValueError("it is a link that leads out of the source")
+        if not path.is_file():
+            raise ValueError("it is no file")
+        with path.open("rb") as stream:
+            data = stream.read(limit + 1)
+    except OSError as err:
+        raise ValueError(f"it cannot be read ({err.strerror or err})") from err
+    if len(data) > limit:
+        raise ValueError(f"it is larger than {limit >> 20} MiB")
+    return data
+
+
+def read_text(path: Path, root: Path) -> str:
+    """A text file that a data set cannot be read without.
+
+    Raises:
+        ConversionError: it cannot be read, or is no text.
+    """
+    try:
+        return read_bytes(path, root, MAX_TEXT_BYTES).decode("utf-8-sig")
+    except ValueError as err:
+        raise ConversionError(f"{path} cannot be read as text: {err}; mend or remove the file.") from err
+
+
+def samples(data: bytes) -> npt.NDArray[Any]:
+    """What a png holds: (H, W) uint8 or uint16, or (H, W, 3) uint8 RGB.
+
+    Raises:
+        ValueError: it is no png, or a broken one.
+    """
+    return pixels.labels(CompressedImage(None, "", "png", memoryview(data)))
+
+
+def image_format(data: bytes) -> str:
+    """`jpeg`, `png`, `webp` or `unknown`, from the first bytes."""
+    return pixels.file_format(CompressedImage(None, "", "", memoryview(data)))
+
+
+def image_size(captures: Iterable[Capture], root: Path) -> tuple[int, int] | None:
+    """(width, height) of the first colour image that can be decoded; None when none can."""
+    for capture in captures:
+        try:
+            data = read_bytes(capture.color, root)
+            height, width = pixels.colour(CompressedImage(None, "", "", memoryview(data))).shape[:2]
+        except ValueError:
+            continue
+        return width, height
+    return None
+
+
+def chosen(names: Collection[str], options: Options, source: Path) -> str:
+    """The sequence to convert: the one that was asked for, else the only one.
+
+    Raises:
+        ConversionError: there is no such sequence, or no clear choice.
+    """
+    known = sorted(names, key=natural)
+    if options.sequence is None and len(known) == 1:
+        return known[0]
+    if options.sequence in known:
+        return options.sequence
+    some = ", ".join(known[:_LISTED]) + (f" and {len(known) - _LISTED} more" if len(known) > _LISTED else "")
+    if options.sequence is None:
+        raise ConversionError(
+            f"{source} holds {len(known)} sequences ({some}), and a log is one of them; choose with --sequence NAME."
+        )
+    near = get_close_matches(options.sequence, known, 1)
+    meant = f" (did you mean {near[0]}?)" if near else ""
+    raise ConversionError(f"{source} has no sequence {options.sequence!r}{meant}; it has {some}.")
+
+
+def truth_of(options: Options, classes: ClassSet, raw_ids: Mapping[int, int]) -> Truth:
+    """Labels by `raw_ids`, raw id -> id in `classes`, everything else ignored; or by the user's class table.
+
+    Raises:
+        ClassTableError: the user's class table cannot be used.
+    """
+    if options.classes_file is not None:
+        return stated_truth(options.classes_file)
+    table = np.full(1 << 16, NO_LABEL, np.uint8)
+    for raw, own in raw_ids.items():
+        table[raw] = own
+
+    def labels(raw: npt.NDArray[Any]) -> Labels:
+        if raw.ndim != 2:
+            raise ValueError("it holds colours, but ids were expected")
+        return np.asarray(table[raw], np.uint8)
+
+    return Truth(classes, labels)
+
+
+def stated_truth(classes_file: Path) -> Truth:
+    """Labels by the user's class table.
+
+    Raises:
+        ClassTableError: it cannot be used.
+    """
+    table = classtable.read_file(classes_file)
+    translate = classtable.Translator(table)
+    return Truth(table.classes, lambda raw: translate(raw)[0])
+
+
+def events(
+    captures: Iterable[Capture],
+    root: Path,
+    notes: list[str],
+    *,
+    labels: Callable[[npt.NDArray[Any]], Labels] | None = None,
+    depth: Callable[[npt.NDArray[Any]], Depth] | None = None,
+) -> Iterator[Event]:
+    """The events of all captures, one file in memory at a time; what cannot be read is a Loss.
+
+    Args:
+        captures: in ascending order of stamps.
+        root: the source.
+        notes: gets a sentence on the first file of each kind that is lost.
+        labels, depth: from the samples of a png to labels, or to depth in metres.
+    """
+    kinds: list[_Kind] = [("colour images", lambda c: c.color, lambda stamp, data: ColorEvent(stamp, _image(data)))]
+    if depth is not None:
+        kinds.append(("depth images", lambda c: c.depth, lambda stamp, data: DepthEvent(stamp, depth(samples(data)))))
+    if labels is not None:
+        kinds.append(("label images", lambda c: c.truth, lambda stamp, data: TruthEvent(stamp, labels(samples(data)))))
+    return _events(captures, root, notes, kinds)
+
+
+def _events(captures: Iterable[Capture], root: Path, notes: list[str], kinds: Sequence[_Kind]) -> Iterator[Event]:
+    complained: set[str] = set()
+    for capture in captures:
+        stamp_ns = capture.stamp_ns
+        if capture.T_WC is not None:
+            yield PoseEvent(stamp_ns, capture.T_WC)
+        for kind, find, make in kinds:
+            if (path := find(capture)) is None:
+                continue
+            try:
+                event = make(stamp_ns, read_bytes(path, root))
+            except ValueError as err:
+                event = Loss(f"{kind} that cannot be read", stamp_ns)
+                if kind not in complained:
+                    complained.add(kind)
+                    notes.append(f"The first of the {event.what} is {path.name}: {err}.")
+            yield event
+
+
+def count(captures: Iterable[Capture]) -> int:
+    """How many events the captures give."""
+    return sum(1 + sum(part is not None for part in (c.truth, c.depth, c.T_WC)) for c in captures)
+
+
+def _image(data: bytes) -> bytes:
+    if image_format(data) == "unknown":
+        raise ValueError("it is no jpeg, png or webp")
+    return data
