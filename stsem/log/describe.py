@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from stsem.log.assemble import Assembly
-from stsem.log.container.files import Given
+from stsem.log.container.files import Given, natural
 from stsem.log.container.source import is_url, local_path, shown_name
 from stsem.log.info import ChannelInfo, Choice, LogInfo
 from stsem.log.poses.tree import is_static
@@ -43,7 +43,7 @@ def log_name(paths: Sequence[Given]) -> str:
 
     It becomes the name of a folder, so it holds no separators, nothing that does not print, and never means a parent.
     """
-    first = min(paths, key=shown_name)
+    first = min(paths, key=lambda given: natural(shown_name(given)))
     name = shown_name(first) if is_url(first) else _local_name(local_path(first))
     kept = re.sub(r'[/\\:*?"<>|]', "_", plain(name.removesuffix(".mcap").removesuffix(".MCAP")))
     while len(kept.encode()) > MAX_NAME:
@@ -62,7 +62,7 @@ def _choice(assembly: Assembly) -> Choice:
         depth=assembly.depth.topic if assembly.depth else None,
         pose=assembly.pose_topic,
         labels=assembly.labels.topic if assembly.labels else None,
-        calibration=assembly.calibration.topic if assembly.calibration else None,
+        calibration=assembly.optics.track.topic if assembly.optics.track else None,
     )
 
 
@@ -70,8 +70,8 @@ def _roles(assembly: Assembly, tracks: Sequence[Track]) -> dict[int, str]:
     """id of track -> what it is used as; tracks that are not used are absent."""
     channels = {"color": assembly.color, "depth": assembly.depth, "labels": assembly.labels}
     found = {id(channel.track): role for role, channel in channels.items() if channel}
-    if assembly.calibration:
-        found[id(assembly.calibration)] = "calibration"
+    if assembly.optics.track:
+        found[id(assembly.optics.track)] = "calibration"
     for track in tracks:
         if assembly.poses and not assembly.poses.by_chain and track.topic == assembly.poses.topic:
             found[id(track)] = "pose"

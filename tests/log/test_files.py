@@ -1,7 +1,9 @@
 """Random access: a bounded cache, each chunk once when going in order, and a file that changes is noticed."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from made_up_logs import BASE_NS, ROS, Recorder
 from mcap.writer import CompressionType
 
 from stsem.errors import LogError
-from stsem.log.container.files import find_files
+from stsem.log.container.files import find_files, left_out
 from stsem.log.container.store import Store
 from stsem.log.scan import scan
 from stsem.log.tracks import References
@@ -76,3 +78,81 @@ def test_nothing_is_read_after_closing(recorder: Callable[..., Recorder]) -> Non
         read_all(store, rows)
     with pytest.raises(LogError, match="was closed"):
         read_all(store, rows)
+
+
+def test_a_file_that_is_written_to_is_noticed(room_log: Path) -> None:
+    """Between two passes, even when its size stays."""
+    (file,) = find_files([room_log])
+    os.utime(room_log, ns=(1, 1))
+    with pytest.raises(LogError, match="changed while it was being read"):
+        file.source.open()
+
+
+def test_what_of_a_folder_is_read(tmp_path: Path) -> None:
+    """Recordings of any capitals and links to them, each once; not what only looks alike."""
+    for name in ("run_0.mcap", "run_10.MCAP", "run_9.mcap", "._run_0.mcap", "metadata.yaml", "run_11.mcap.active"):
+        (tmp_path / name).write_bytes(b"x")
+    (tmp_path / "run_8.mcap").symlink_to(tmp_path / "run_9.mcap")
+    (tmp_path / "below.mcap").mkdir()
+    found = [file.source.name for file in find_files([tmp_path])]
+    assert found == ["run_0.mcap", "run_9.mcap", "run_10.MCAP"]
+    (sentence,) = left_out([tmp_path, "memory://x"])
+    assert sentence.startswith("run_11.mcap.active was left unfinished")
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["a/x.mcap", "b/y.mcap", "c/z.txt"], "give one of the recordings in it: a, b."),
+        (["run_0.mcap.active"], "run_0.mcap.active; give an unfinished recording by its own path"),
+        (["run_0.mcap.zstd"], "unpack a packed one first"),
+        (["x.txt"], "holds no .mcap file; give"),
+    ],
+)
+def test_a_folder_without_a_recording_says_what_it_has(tmp_path: Path, names: list[str], words: str) -> None:
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    with pytest.raises(LogError) as caught:
+        find_files([tmp_path])
+    assert words in str(caught.value)
+
+
+def test_links_to_nothing_and_names_that_cannot_be(tmp_path: Path) -> None:
+    """A part that was not fetched is not left out in silence."""
+    (tmp_path / "run_0.mcap").touch()
+    (tmp_path / "run_1.mcap").symlink_to(tmp_path / "annex")
+    for given in (tmp_path, tmp_path / "run_1.mcap"):
+        with pytest.raises(LogError, match="is a link to nothing"):
+            find_files([given])
+    (tmp_path / "loop.mcap").symlink_to(tmp_path / "loop.mcap")
+    for name in ("loop.mcap", "x" * 300, "a\0b", "run_0.mcap/x"):
+        with pytest.raises(LogError):
+            find_files([str(tmp_path / name)])
+
+
+def test_a_part_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "run_0.mcap").touch()
+    (file,) = find_files([tmp_path])
+
+    def refuse(self: Path, mode: str) -> BinaryIO:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(LogError, match=r"run_0\.mcap cannot be read \(Permission denied\)"):
+        file.source.open()
+
+
+def test_an_empty_part_is_damage(recorder: Callable[..., Recorder], tmp_path: Path) -> None:
+    """What a crashed recorder leaves behind: the other parts are read, and the log is lossy; alone it is no log."""
+    images(recorder, 3)
+    (tmp_path / "4.mcap").touch()
+    (tmp_path / "2.mcap").touch()
+    result = scan(find_files([tmp_path]))
+    assert result.damage.counts == {"truncated": {"": 2}}
+    rows = result.tracks["/cam", "cdr", IMAGE].references()
+    with Store(result.files, result.chunks) as store:
+        assert len(read_all(store, rows)) == 3
+    (tmp_path / "3.mcap").unlink()
+    with pytest.raises(LogError, match="is empty"):
+        scan(find_files([tmp_path]))
