@@ -12,7 +12,7 @@ from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from stsem.log.pixels import MILLIMETRES_TO_METRES
+from stsem.log.pixels.metres import MILLIMETRES_TO_METRES
 
 FRAMES, WIDTH, HEIGHT, PERIOD_NS = 120, 960, 540, 100_000_000
 IMAGE = "sensor_msgs/msg/Image"

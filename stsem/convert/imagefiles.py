@@ -15,7 +15,8 @@ from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.convert.recording import ColorEvent, DepthEvent, Event, Loss, Options, PoseEvent, TruthEvent
 from stsem.errors import ConversionError
 from stsem.frame import Depth
-from stsem.log import classtable, pixels
+from stsem.log import classtable
+from stsem.log.pixels import decode, formats
 from stsem.log.schemas.messages import CompressedImage
 from stsem.pose import Pose
 
@@ -111,12 +112,12 @@ def samples(data: bytes) -> npt.NDArray[Any]:
     Raises:
         ValueError: it is no png, or a broken one.
     """
-    return pixels.labels(CompressedImage(None, "", "png", memoryview(data)))
+    return decode.labels(CompressedImage(None, "", "png", memoryview(data)))
 
 
 def image_format(data: bytes) -> str:
     """`jpeg`, `png`, `webp` or `unknown`, from the first bytes."""
-    return pixels.file_format(CompressedImage(None, "", "", memoryview(data)))
+    return formats.file_format(CompressedImage(None, "", "", memoryview(data)))
 
 
 def image_size(captures: Iterable[Capture], root: Path) -> tuple[int, int] | None:
@@ -124,7 +125,7 @@ def image_size(captures: Iterable[Capture], root: Path) -> tuple[int, int] | Non
     for capture in captures:
         try:
             data = read_bytes(capture.color, root)
-            height, width = pixels.colour(CompressedImage(None, "", "", memoryview(data))).shape[:2]
+            height, width = decode.colour(CompressedImage(None, "", "", memoryview(data))).shape[:2]
         except ValueError:
             continue
         return width, height

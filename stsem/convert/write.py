@@ -17,7 +17,7 @@ from stsem.convert.recording import (
 )
 from stsem.errors import ConversionError
 from stsem.frame import Image
-from stsem.log import pixels
+from stsem.log.pixels import formats
 from stsem.log.schemas.messages import CompressedImage
 from stsem.log.writer import COLOR, LogWriter
 
@@ -87,7 +87,7 @@ def _write(log: LogWriter, event: _Measured) -> None:
 
 def _write_color(log: LogWriter, stamp_ns: int, image: bytes | Image) -> None:
     if isinstance(image, bytes):
-        form = pixels.file_format(CompressedImage(None, "", "", memoryview(image)))
+        form = formats.file_format(CompressedImage(None, "", "", memoryview(image)))
         log.color_file(stamp_ns, stamp_ns, image, form)
     else:
         log.color_pixels(stamp_ns, stamp_ns, image)

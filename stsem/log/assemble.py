@@ -9,7 +9,6 @@ import numpy as np
 
 from stsem.camera import Camera
 from stsem.errors import ChannelError, DecodeError, LogError, UsageError
-from stsem.log import pixels
 from stsem.log.choose import (
     Candidate,
     check_overrides,
@@ -21,6 +20,7 @@ from stsem.log.choose import (
 from stsem.log.classtable import ClassTable, find_table
 from stsem.log.container.files import File
 from stsem.log.container.store import Store
+from stsem.log.pixels import decode
 from stsem.log.plan import clock_offset_ns, out_of_range
 from stsem.log.poses.find import find_poses
 from stsem.log.poses.source import PoseSource
@@ -144,10 +144,10 @@ def _partner(
 
 def _size(color: ImageChannel) -> tuple[int, int]:
     """Size of the first colour image that can be decoded."""
-    found = color.first(lambda message: pixels.colour(message).shape)
+    found = color.first(lambda message: decode.colour(message).shape)
     if found is None:
         try:
-            color.read(0, pixels.colour)
+            color.read(0, decode.colour)
         except DecodeError as err:
             raise ChannelError(
                 f"No image of {color.topic} can be decoded: {err.reason}; choose another with --topic color=TOPIC."
@@ -160,7 +160,7 @@ def _usable_depth(
     channel: ImageChannel, depth: Candidate, color: Candidate, result: Assembly, registered: str
 ) -> ImageChannel | None:
     """The depth channel if its pixels are those of the colour image."""
-    found = channel.first(lambda message: pixels.depth(message).shape)
+    found = channel.first(lambda message: decode.depth(message).shape)
     if found is None:
         result.warnings.append(
             f"No depth image of {channel.topic} can be decoded ({depth.look.name}): depth is not used."

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from stsem.errors import ChannelError, UsageError
-from stsem.log.pixels import Look
+from stsem.log.pixels.look import Look
 from stsem.log.schemas.messages import Kind
 from stsem.log.tracks import IMAGES, Track
 

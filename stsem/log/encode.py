@@ -9,7 +9,7 @@ from foxglove import messages as fox
 
 from stsem.camera import Camera
 from stsem.frame import Depth, Image
-from stsem.log.pixels import MILLIMETRES_TO_METRES
+from stsem.log.pixels.metres import MILLIMETRES_TO_METRES
 from stsem.pose import Pose, to_quaternion
 
 JPEG_QUALITY = 85

@@ -13,14 +13,14 @@ from stsem.camera import Camera
 from stsem.classes import ClassSet, Labels
 from stsem.errors import ChannelError, DecodeError
 from stsem.frame import Depth, Frame, Image
-from stsem.log import pixels
 from stsem.log.assemble import Assembly, assemble
 from stsem.log.classtable import Translator
 from stsem.log.container.files import Given, find_files, left_out
 from stsem.log.container.store import Store
 from stsem.log.describe import describe
 from stsem.log.info import LogInfo
-from stsem.log.pixels import ImageMessage
+from stsem.log.pixels import decode
+from stsem.log.pixels.look import ImageMessage
 from stsem.log.plan import (
     UNKNOWN_PERIOD_NS,
     FramePlan,
@@ -199,7 +199,7 @@ class Log:
 
     def _decode_image(self, row: int) -> Image:
         def convert(message: ImageMessage) -> Image:
-            return _of_size(pixels.colour(message), self._assembly.size, "the first image")
+            return _of_size(decode.colour(message), self._assembly.size, "the first image")
 
         return self._color.read(row, convert)
 
@@ -208,7 +208,7 @@ class Log:
             return None
         translate = self._translate
         try:
-            labels, unknown = self._labels.read(row, lambda message: translate(pixels.labels(message)))
+            labels, unknown = self._labels.read(row, lambda message: translate(decode.labels(message)))
         except DecodeError:
             return None
         if unknown:
@@ -230,7 +230,7 @@ class Log:
             return None
 
         def convert(message: ImageMessage) -> Depth:
-            return _of_size(pixels.depth(message), self._assembly.size, "colour")
+            return _of_size(decode.depth(message), self._assembly.size, "colour")
 
         try:
             return self._depth.read(partner, convert)

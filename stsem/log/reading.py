@@ -7,7 +7,7 @@ from typing import TypeVar
 from stsem.errors import DecodeError, LogError
 from stsem.log.container.damage import Damage
 from stsem.log.container.store import Store
-from stsem.log.pixels import ImageMessage, Look, look
+from stsem.log.pixels.look import ImageMessage, Look, look
 from stsem.log.schemas.messages import CompressedImage, RawImage
 from stsem.log.tracks import Track
 from stsem.plain import plain
