@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from stsem.convert import bags
 from stsem.convert.recording import Options, Progress, Summary
 
 Convert = Callable[[Path, Path, Options, Progress], Summary]
@@ -20,12 +21,21 @@ class Format:
         detect: whether a path looks like one; cheap, and never raises.
         convert: writes it as a log. Of a data set, `dataset(read)`, where `read(source, options)` opens it as a
             `Recording` and raises ConversionError with one sentence when it cannot.
+        last: whether it is looked at only when nothing else fits.
     """
 
     summary: str
     expects: str
     detect: Callable[[Path], bool]
     convert: Convert
+    last: bool = False
 
 
-FORMATS: dict[str, Format] = {}
+FORMATS: dict[str, Format] = {
+    "rosbag1": Format(
+        "ROS 1 bag", "file.bag: plain, bz2 or lz4, indexed or not", bags.is_rosbag1, bags.convert_rosbag1
+    ),
+    "rosbag2": Format(
+        "ROS 2 bag in sqlite3", "a folder of .db3 or .db3.zstd files", bags.is_rosbag2, bags.convert_rosbag2
+    ),
+}

@@ -20,6 +20,7 @@ from stsem.log.pixels import decode, formats
 from stsem.log.schemas.messages import CompressedImage
 from stsem.pose import Pose
 
+IMAGE_FORMATS = (formats.JPEG, formats.PNG, formats.WEBP)
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 MAX_FILE_BYTES = 256 << 20
 MAX_TEXT_BYTES = 16 << 20
@@ -30,10 +31,10 @@ _NUMBER = re.compile(r"(\d+)")
 
 @dataclass(frozen=True, eq=False)
 class Capture:
-    """What belongs to one colour image: its stamp, the files that lie beside it, its pose T_WC (4, 4)."""
+    """What belongs to one stamp: a colour image, the files that lie beside it, its pose T_WC (4, 4); any may lack."""
 
     stamp_ns: int
-    color: Path
+    color: Path | None = None
     truth: Path | None = None
     depth: Path | None = None
     T_WC: Pose | None = None
@@ -115,16 +116,18 @@ def samples(data: bytes) -> npt.NDArray[Any]:
     return decode.labels(CompressedImage(None, "", "png", memoryview(data)))
 
 
-def image_format(data: bytes) -> str:
-    """`jpeg`, `png`, `webp` or `unknown`, from the first bytes."""
-    return formats.file_format(CompressedImage(None, "", "", memoryview(data)))
+def image_file(data: bytes) -> bytes:
+    """The bytes of an image file as they came; ValueError when they do not begin like one that a log may hold."""
+    if formats.file_format(CompressedImage(None, "", "", memoryview(data))) not in IMAGE_FORMATS:
+        raise ValueError("it is no jpeg, png or webp")
+    return data
 
 
 def image_size(captures: Iterable[Capture], root: Path) -> tuple[int, int] | None:
     """(width, height) of the first colour image that can be decoded; None when none can."""
-    for capture in captures:
+    for path in (capture.color for capture in captures if capture.color is not None):
         try:
-            data = read_bytes(capture.color, root)
+            data = read_bytes(path, root)
             height, width = decode.colour(CompressedImage(None, "", "", memoryview(data))).shape[:2]
         except ValueError:
             continue
@@ -200,7 +203,7 @@ def events(
         notes: gets a sentence on the first file of each kind that is lost.
         labels, depth: from the samples of a png to labels, or to depth in metres.
     """
-    kinds: list[_Kind] = [("colour images", lambda c: c.color, lambda stamp, data: ColorEvent(stamp, _image(data)))]
+    kinds: list[_Kind] = [("colour images", lambda c: c.color, lambda stamp, data: ColorEvent(stamp, image_file(data)))]
     if depth is not None:
         kinds.append(("depth images", lambda c: c.depth, lambda stamp, data: DepthEvent(stamp, depth(samples(data)))))
     if labels is not None:
@@ -229,10 +232,4 @@ def _events(captures: Iterable[Capture], root: Path, notes: list[str], kinds: Se
 
 def count(captures: Iterable[Capture]) -> int:
     """How many events the captures give."""
-    return sum(1 + sum(part is not None for part in (c.truth, c.depth, c.T_WC)) for c in captures)
-
-
-def _image(data: bytes) -> bytes:
-    if image_format(data) == "unknown":
-        raise ValueError("it is no jpeg, png or webp")
-    return data
+    return sum(part is not None for c in captures for part in (c.color, c.truth, c.depth, c.T_WC))

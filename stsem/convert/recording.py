@@ -56,10 +56,12 @@ class Loss:
     Args:
         what: the kind of thing, in the plural, and why: "colour images that cannot be decoded".
         stamp_ns: where it would have stood; None when that is not known.
+        count: how many.
     """
 
     what: str
     stamp_ns: int | None = None
+    count: int = 1
 
 
 Event = ColorEvent | DepthEvent | TruthEvent | PoseEvent | Loss

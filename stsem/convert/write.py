@@ -47,7 +47,7 @@ def write_recording(recording: Recording, out: Path, progress: Progress) -> Summ
     with LogWriter(out, recording.classes, declared=()) as log:
         for done, event in enumerate(recording.events, 1):
             if isinstance(event, Loss):
-                losses[event.what] += 1
+                losses[event.what] += event.count
             elif not 0 <= event.stamp_ns < MAX_STAMP_NS:
                 losses["messages with stamps before 1970 or after 2106"] += 1
             elif last_ns is not None and event.stamp_ns < last_ns:
