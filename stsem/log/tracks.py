@@ -10,7 +10,7 @@ from mcap.records import Schema
 
 from stsem.log.container.damage import Damage
 from stsem.log.schemas.messages import Calibration, ClassNames, Decoded, Kind, Transform
-from stsem.log.schemas.table import TABLE, MessageReader, Row, StampReader
+from stsem.log.schemas.table import TABLE, MessageReader, Row, StampReader, why_not
 from stsem.plain import plain
 
 Int64 = npt.NDArray[np.int64]
@@ -79,7 +79,7 @@ class Track:
     def __init__(self, topic: str, schema: Schema, encoding: str, damage: Damage) -> None:
         self.topic, self.schema, self.encoding = plain(topic), plain(schema.name), plain(encoding)
         self.row: Row | None = TABLE.get((encoding, schema.name))
-        self.trouble = ""
+        self.trouble = f"{self.topic}: {plain(why)}" if (why := why_not(encoding, schema.name)) else ""
         self.count = self.unstamped = self.largest_gap_ns = 0
         self.first_log_ns: int | None = None
         self.last_log_ns: int | None = None
@@ -153,7 +153,7 @@ class Track:
                     transform, log_ns
                 )
             return stamps[0] if stamps else None
-        if isinstance(message, Calibration) and [message.camera] != [c.camera for c in self.calibrations[-1:]]:
+        if isinstance(message, Calibration) and not (self.calibrations and message.same_as(self.calibrations[-1])):
             self.calibrations.append(message)
         if isinstance(message, ClassNames) and [message.names] != [c.names for c in self.class_names[-1:]]:
             self.class_names.append(message)

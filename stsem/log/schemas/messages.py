@@ -58,6 +58,10 @@ class Calibration:
     camera: Camera | None
     rectified: Camera | None = None
 
+    def same_as(self, other: "Calibration") -> bool:
+        """Whether both say the same of the camera, whenever they do."""
+        return (self.camera, self.rectified) == (other.camera, other.rectified)
+
 
 @dataclass(frozen=True)
 class Transform:

@@ -1,22 +1,39 @@
-"""foxglove messages (protobuf): images by a walk over the wire format, without a copy; small messages by the library.
+"""foxglove messages in protobuf: the wire format to a mapping of fields, bytes as views without a copy.
 
-Field numbers are taken from the schema in the file, by name. Readers raise ValueError, IndexError or what the library
-raises when the bytes are not such a message.
+Field numbers and types are taken from the schema in the file, by name. Readers raise ValueError or IndexError when the
+bytes are not such a message.
 """
 
-from collections.abc import Callable, Iterator
-from typing import Any
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
-from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[import-untyped]
+from google.protobuf import descriptor_pb2, message  # type: ignore[import-untyped]
 from mcap.records import Schema
-from mcap_protobuf.decoder import DecoderFactory
 
-from stsem.log.schemas.calibration import Intrinsics, calibration
-from stsem.log.schemas.messages import Calibration, CompressedImage, RawImage, Transform
+from stsem.log.schemas import foxglove
+from stsem.log.schemas.cursor import MAX_TEXT
+from stsem.log.schemas.foxglove import Fields
+from stsem.log.schemas.messages import Decoded
 
-NS = 1_000_000_000
+MAX_SCHEMA_BYTES = 1 << 20
+MAX_DEPTH = 20
+MAX_FIELDS = 100_000
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
-Field = int | memoryview
+Proto = descriptor_pb2.FieldDescriptorProto
+WireValue = int | memoryview
+FORMATS = {
+    Proto.TYPE_DOUBLE: "d", Proto.TYPE_FIXED64: "Q", Proto.TYPE_SFIXED64: "q",
+    Proto.TYPE_FLOAT: "f", Proto.TYPE_FIXED32: "I", Proto.TYPE_SFIXED32: "i",
+}  # fmt: skip
+"""Numbers of a fixed size, as in struct."""
+SIGNED = (Proto.TYPE_INT32, Proto.TYPE_INT64)
+WIRE_TYPES = {
+    **{number: FIXED64 if form in "dQq" else FIXED32 for number, form in FORMATS.items()},
+    **dict.fromkeys((*SIGNED, Proto.TYPE_UINT32, Proto.TYPE_UINT64), VARINT),
+    **dict.fromkeys((Proto.TYPE_STRING, Proto.TYPE_BYTES, Proto.TYPE_MESSAGE), BYTES),
+}
+"""Type of a field that is read -> how the wire holds it."""
 
 
 def varint(data: memoryview, at: int) -> tuple[int, int]:
@@ -33,15 +50,17 @@ def varint(data: memoryview, at: int) -> tuple[int, int]:
             raise ValueError("a number is longer than 10 bytes")
 
 
-def fields(data: memoryview) -> Iterator[tuple[int, Field]]:
-    """(number, value) of each field of one message: int for varints, a view for everything else."""
+def walk(data: memoryview) -> Iterator[tuple[int, int, WireValue]]:
+    """(number, wire type, value) of each field of one message: int for varints, a view for everything else."""
     at, end = 0, len(data)
-    while at < end:
+    for _ in range(MAX_FIELDS):
+        if at >= end:
+            return
         tag, at = varint(data, at)
         wire = tag & 7
         if wire == VARINT:
             value, at = varint(data, at)
-            yield tag >> 3, value
+            yield tag >> 3, wire, value
             continue
         if wire == BYTES:
             length, at = varint(data, at)
@@ -49,112 +68,135 @@ def fields(data: memoryview) -> Iterator[tuple[int, Field]]:
             length = 8 if wire == FIXED64 else 4
         else:
             raise ValueError(f"wire type {wire} is unknown")
-        if at + length > end:
+        if length > end - at:
             raise ValueError(f"{length} bytes are announced but {end - at} are there")
-        yield tag >> 3, data[at : at + length]
+        yield tag >> 3, wire, data[at : at + length]
         at += length
+    raise ValueError(f"the message has more than {MAX_FIELDS} fields")
 
 
-def numbers(schema: Schema) -> dict[str, int]:
-    """Field name -> number of the message that `schema` describes."""
-    for file in FileDescriptorSet.FromString(schema.data).file:
-        for message in file.message_type:
-            if schema.name == (f"{file.package}.{message.name}" if file.package else message.name):
-                return {field.name: field.number for field in message.field}
-    raise ValueError(f"the schema does not describe {schema.name}")
+Types = dict[str, Any]
+"""Full name of a message type, with a leading dot -> its descriptor."""
+
+
+def message_types(schema: Schema) -> Types:
+    """The types that `schema` describes.
+
+    Raises:
+        ValueError: it is no set of descriptors, a huge one, or does not describe its own message.
+    """
+    if schema.encoding != "protobuf":
+        raise ValueError(f"a schema in {schema.encoding!r} cannot be read, only 'protobuf'")
+    if len(schema.data) > MAX_SCHEMA_BYTES:
+        raise ValueError(f"it has {len(schema.data)} bytes, more than any message definition")
+    try:
+        files = descriptor_pb2.FileDescriptorSet.FromString(schema.data).file
+    except message.DecodeError as err:
+        raise ValueError("it is no set of protobuf descriptors") from err
+    types = {
+        f".{file.package}.{one.name}" if file.package else f".{one.name}": one
+        for file in files
+        for one in file.message_type
+    }
+    if f".{schema.name}" not in types:
+        raise ValueError(f"it does not describe {schema.name}")
+    return types
+
+
+class _Field(NamedTuple):
+    """One field of a message type, as its descriptor says; `type_name` is "" unless it is a message."""
+
+    name: str
+    type: int
+    type_name: str
+    repeated: bool
+
+
+class Messages:
+    """Reads messages of the types that `schema` describes; raises ValueError as `message_types` does."""
+
+    def __init__(self, schema: Schema) -> None:
+        self._types = message_types(schema)
+        self._fields: dict[str, dict[int, _Field]] = {}
+
+    def read(self, type_name: str, payload: memoryview, depth: int = 0) -> dict[str, Any]:
+        """Field name -> int, float, str, view, mapping, or a list of them; fields nobody knows are passed over."""
+        if depth > MAX_DEPTH:
+            raise ValueError("the message is nested too deeply")
+        fields, found = self.fields(type_name), dict[str, Any]()
+        for number, wire, value in walk(payload):
+            field = fields.get(number)
+            if field is None:
+                continue
+            if field.repeated:
+                found.setdefault(field.name, []).extend(self._items(field, wire, value, depth))
+            else:
+                found[field.name] = self._value(field, wire, value, depth)
+        return found
+
+    def fields(self, type_name: str) -> dict[int, _Field]:
+        """Number -> field of one type, those with a type that is read."""
+        if type_name not in self._fields:
+            if type_name not in self._types:
+                raise ValueError(f"{type_name[1:80]} is not described by the schema")
+            self._fields[type_name] = {
+                field.number: _Field(field.name, field.type, field.type_name, field.label == Proto.LABEL_REPEATED)
+                for field in self._types[type_name].field
+                if field.type in WIRE_TYPES
+            }
+        return self._fields[type_name]
+
+    def _items(self, field: _Field, wire: int, value: WireValue, depth: int) -> Sequence[Any]:
+        form = FORMATS.get(field.type)
+        if form is None or isinstance(value, int) or wire != BYTES:
+            return (self._value(field, wire, value, depth),)
+        count, rest = divmod(len(value), struct.calcsize("<" + form))
+        if rest or count > MAX_FIELDS:
+            raise ValueError(f"{field.name} has {len(value)} bytes, which is no list of numbers")
+        return struct.unpack(f"<{count}{form}", value)
+
+    def _value(self, field: _Field, wire: int, value: WireValue, depth: int) -> Any:
+        if wire != WIRE_TYPES[field.type]:
+            raise ValueError(f"{field.name} is of wire type {wire} instead of {WIRE_TYPES[field.type]}")
+        if isinstance(value, int):
+            return value - (1 << 64) if value >> 63 and field.type in SIGNED else value
+        if field.type == Proto.TYPE_MESSAGE:
+            return self.read(field.type_name, value, depth + 1)
+        if field.type == Proto.TYPE_STRING:
+            return _text(field.name, value)
+        return value if field.type == Proto.TYPE_BYTES else struct.unpack("<" + FORMATS[field.type], value)[0]
+
+
+def reader(convert: Callable[[Fields], Decoded]) -> Callable[[Schema], Callable[[memoryview], Decoded]]:
+    """Makes the reader of a message type from the schema in the file."""
+
+    def make(schema: Schema) -> Callable[[memoryview], Decoded]:
+        messages, name = Messages(schema), f".{schema.name}"
+        return lambda payload: convert(messages.read(name, payload))
+
+    return make
 
 
 def stamp_reader(schema: Schema) -> Callable[[memoryview], int | None]:
-    """Reader of the field `timestamp` alone; walks no further than it."""
-    wanted = numbers(schema)["timestamp"]
+    """Makes the reader of the field `timestamp` alone, which walks no further than it."""
+    messages = Messages(schema)
+    found = {field.name: (number, field.type_name) for number, field in messages.fields(f".{schema.name}").items()}
+    if "timestamp" not in found:
+        raise ValueError(f"{schema.name} has no timestamp")
+    wanted, type_name = found["timestamp"]
 
     def read(payload: memoryview) -> int | None:
-        return next((_timestamp(value) for number, value in fields(payload) if number == wanted), None)
-
-    return read
-
-
-def raw_image(schema: Schema) -> Callable[[memoryview], RawImage]:
-    """Reader of foxglove.RawImage, whose samples are little endian."""
-    n = numbers(schema)
-
-    def read(payload: memoryview) -> RawImage:
-        got = dict(fields(payload))
-        width, height, step = (_int(got.get(n[name], 0)) for name in ("width", "height", "step"))
-        encoding, frame_id = _text(got.get(n["encoding"])), _text(got.get(n["frame_id"]))
-        stamp_ns, data = _timestamp(got.get(n["timestamp"])), _bytes(got.get(n["data"]))
-        return RawImage(stamp_ns, frame_id, width, height, encoding, False, step, data)
-
-    return read
-
-
-def compressed_image(schema: Schema) -> Callable[[memoryview], CompressedImage]:
-    """Reader of foxglove.CompressedImage (and CompressedVideo, whose data are refused later)."""
-    n = numbers(schema)
-
-    def read(payload: memoryview) -> CompressedImage:
-        got = dict(fields(payload))
-        frame_id, form = _text(got.get(n["frame_id"])), _text(got.get(n["format"]))
-        return CompressedImage(_timestamp(got.get(n["timestamp"])), frame_id, form, _bytes(got.get(n["data"])))
-
-    return read
-
-
-def camera_calibration(schema: Schema) -> Callable[[memoryview], Calibration]:
-    """Reader of foxglove.CameraCalibration."""
-    decode = _library(schema)
-
-    def read(payload: memoryview) -> Calibration:
-        message = decode(bytes(payload))
-        sensor = Intrinsics(message.width, message.height, message.K, message.D, message.distortion_model, message.P)
-        return calibration(_stamp(message.timestamp), message.frame_id, sensor)
-
-    return read
-
-
-def pose_in_frame(schema: Schema) -> Callable[[memoryview], tuple[Transform, ...]]:
-    """Reader of foxglove.PoseInFrame."""
-    decode = _library(schema)
-
-    def read(payload: memoryview) -> tuple[Transform, ...]:
-        message = decode(bytes(payload))
-        t, q = message.pose.position, message.pose.orientation
-        stamp_ns = _stamp(message.timestamp)
-        return (Transform(stamp_ns, message.frame_id, "", (t.x, t.y, t.z), (q.x, q.y, q.z, q.w)),)
-
-    return read
-
-
-def _library(schema: Schema) -> Callable[[bytes], Any]:
-    decode = DecoderFactory().decoder_for("protobuf", schema)
-    if decode is None:
-        raise ValueError(f"a schema in {schema.encoding!r} cannot be read, only 'protobuf'")
-    return decode
-
-
-def _stamp(timestamp: Any) -> int | None:
-    return timestamp.seconds * NS + timestamp.nanos or None
-
-
-def _timestamp(value: Field | None) -> int | None:
-    """google.protobuf.Timestamp: seconds (1) and nanos (2); None when absent or zero, which means unset."""
-    if value is None:
+        for number, _, value in walk(payload):
+            if number == wanted:
+                if isinstance(value, int):
+                    raise ValueError("timestamp is not a message")
+                return foxglove.stamp({"timestamp": messages.read(type_name, value)})
         return None
-    got = dict(fields(_bytes(value)))
-    return _int(got.get(1, 0)) * NS + _int(got.get(2, 0)) or None
+
+    return read
 
 
-def _int(value: Field) -> int:
-    if isinstance(value, int):
-        return value
-    return int.from_bytes(value, "little")
-
-
-def _bytes(value: Field | None) -> memoryview:
-    if isinstance(value, int):
-        raise ValueError("a number came where bytes were expected")
-    return memoryview(b"") if value is None else value
-
-
-def _text(value: Field | None) -> str:
-    return bytes(_bytes(value)).decode()
+def _text(name: str, value: memoryview) -> str:
+    if len(value) > MAX_TEXT:
+        raise ValueError(f"{name} has {len(value)} bytes")
+    return bytes(value).decode()

@@ -3,16 +3,19 @@
 A new message type is a row; a new family is a file of readers and its rows.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from mcap.records import Schema
 
-from stsem.log.schemas import protobuf, ros2
+from stsem.log.schemas import cursor, foxglove, foxglove_json, protobuf, ros
+from stsem.log.schemas.foxglove import Fields
 from stsem.log.schemas.messages import Decoded, Kind
 
 StampReader = Callable[[memoryview], int | None]
 MessageReader = Callable[[memoryview], Decoded]
+IMAGES = (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO)
+Rows = Iterator[tuple[tuple[str, str], "Row"]]
 
 
 @dataclass(frozen=True)
@@ -33,24 +36,45 @@ class Row:
     stamp_bytes: int = 0
 
 
-def _header(_: Schema) -> StampReader:
-    return ros2.header_stamp
+ROS_FAMILIES: dict[str, cursor.Open] = {"cdr": cursor.cdr, "ros1": cursor.ros1}
+ROS_SPELLINGS = ("{0}/msg/{1}", "{0}/{1}", "{0}::msg::dds_::{1}_")
+"""Names of a type by ROS 2, by ROS 1, and by recorders of plain DDS; each family reads them all."""
 
-
-CDR_HEADER_STAMP = 12
-
-TABLE: dict[tuple[str, str], Row] = {
-    ("cdr", "sensor_msgs/msg/Image"): Row(Kind.IMAGE, ros2.image, _header),
-    ("cdr", "sensor_msgs/msg/CompressedImage"): Row(Kind.COMPRESSED, ros2.compressed_image, _header),
-    ("cdr", "sensor_msgs/msg/CameraInfo"): Row(
-        Kind.CALIBRATION, ros2.camera_info, _header, stamp_bytes=CDR_HEADER_STAMP
-    ),
-    ("cdr", "tf2_msgs/msg/TFMessage"): Row(Kind.TRANSFORMS, ros2.tf_message),
-    ("cdr", "geometry_msgs/msg/PoseStamped"): Row(Kind.POSE, ros2.pose_stamped),
-    ("cdr", "vision_msgs/msg/LabelInfo"): Row(Kind.CLASS_TABLE, ros2.label_info),
-    ("protobuf", "foxglove.RawImage"): Row(Kind.IMAGE, protobuf.raw_image, protobuf.stamp_reader),
-    ("protobuf", "foxglove.CompressedImage"): Row(Kind.COMPRESSED, protobuf.compressed_image, protobuf.stamp_reader),
-    ("protobuf", "foxglove.CompressedVideo"): Row(Kind.VIDEO, protobuf.compressed_image, protobuf.stamp_reader),
-    ("protobuf", "foxglove.CameraCalibration"): Row(Kind.CALIBRATION, protobuf.camera_calibration),
-    ("protobuf", "foxglove.PoseInFrame"): Row(Kind.POSE, protobuf.pose_in_frame),
+FOXGLOVE: dict[str, tuple[Kind, Callable[[Fields], Decoded]]] = {
+    "foxglove.RawImage": (Kind.IMAGE, foxglove.raw_image),
+    "foxglove.CompressedImage": (Kind.COMPRESSED, foxglove.compressed_image),
+    "foxglove.CompressedVideo": (Kind.VIDEO, foxglove.compressed_image),
+    "foxglove.CameraCalibration": (Kind.CALIBRATION, foxglove.camera_calibration),
+    "foxglove.FrameTransform": (Kind.TRANSFORMS, foxglove.frame_transform),
+    "foxglove.FrameTransforms": (Kind.TRANSFORMS, foxglove.frame_transforms),
+    "foxglove.PoseInFrame": (Kind.POSE, foxglove.pose_in_frame),
+    "foxglove.Odometry": (Kind.POSE, foxglove.odometry),
 }
+
+
+def _ros_rows() -> Rows:
+    for encoding, begin in ROS_FAMILIES.items():
+        for name, message in ros.TYPES.items():
+            stamp = ros.stamp_reader(message, begin) if message.kind in (*IMAGES, Kind.CALIBRATION) else None
+            row = Row(message.kind, ros.reader(message, begin), stamp, ros.STAMP_BYTES if stamp else 0)
+            for spelling in ROS_SPELLINGS:
+                yield (encoding, spelling.format(*name.split("/"))), row
+
+
+def _foxglove_rows() -> Rows:
+    for name, (kind, convert) in FOXGLOVE.items():
+        is_image = kind in IMAGES
+        yield ("protobuf", name), Row(kind, protobuf.reader(convert), protobuf.stamp_reader if is_image else None)
+        yield ("json", name), Row(kind, foxglove_json.reader(convert), foxglove_json.stamp_reader if is_image else None)
+
+
+TABLE: dict[tuple[str, str], Row] = {**dict(_ros_rows()), **dict(_foxglove_rows())}
+_NAMES = frozenset(name for _, name in TABLE)
+
+
+def why_not(encoding: str, schema_name: str) -> str:
+    """Why a message type is not read although its name is known from another encoding; "" for all other types."""
+    if (encoding, schema_name) in TABLE or schema_name not in _NAMES:
+        return ""
+    known = sorted({other for other, name in TABLE if name == schema_name})
+    return f"messages in {encoding!r} are not read; record {schema_name} as {' or '.join(known)}"
