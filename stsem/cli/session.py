@@ -2,7 +2,7 @@
 
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -20,6 +20,7 @@ from stsem.errors import NotRepeatableError, StsemError, UsageError
 from stsem.log.container.source import shown_name, without_secrets
 from stsem.log.describe import log_name
 from stsem.log.log import Log, open_log
+from stsem.plain import MAX_SENTENCE, plain
 from stsem.replay.build import Model, build_model, truth_frames
 from stsem.replay.config import RunConfig
 from stsem.replay.costing import Costing, costing
@@ -182,9 +183,9 @@ def _host(session: Session, context: Context, began: Began) -> Host:
     replayed = context.replayed
     inside = sum(sum(times) for times in replayed.stage_times_ns.values())
     return Host(
-        paths={"log": ", ".join(map(str, session.log.info.sources)), "model": session.config.model,
+        paths={"log": _shown(map(str, session.log.info.sources), ", "), "model": session.config.model,
                "costs": session.config.costs},
-        command=" ".join(map(without_secrets, sys.argv)),
+        command=_shown(sys.argv, " "),
         machine=hostclock.machine_facts(),
         started_at=hostclock.utc_now(),
         wall_s=(hostclock.wall_ns() - began.wall_ns) / 1e9,
@@ -196,6 +197,11 @@ def _host(session: Session, context: Context, began: Began) -> Host:
         overhead_ms=(replayed.wall_ns - inside) / max(1, len(replayed.slots)) / 1e6,
         peak_memory_bytes=hostclock.peak_memory_bytes(),
     )  # fmt: skip
+
+
+def _shown(words: Iterable[str], between: str) -> str:
+    """Paths and addresses as a report may show them."""
+    return between.join(plain(without_secrets(word), MAX_SENTENCE) for word in words)
 
 
 def _print(document: Document, folder: Path, config: RunConfig) -> None:
