@@ -4,6 +4,7 @@
     |-- UsageError             2   a flag, a config key or a value that cannot be
     |-- LogError               1   the log as a whole cannot be read
     |   |-- ChannelError       1   a channel is missing, ambiguous or of the wrong kind
+    |   |   `-- UndecodableError 5   none of a channel's images can be decoded: nothing can be measured
     |   `-- DecodeError        1   one message cannot be decoded (survivable: the frame is `undecodable`)
     |-- ClassTableError        1   the class names of a log, a file or a network
     |-- NetworkError           1   an ONNX file, its sidecar, or what it returns
@@ -45,7 +46,23 @@ class LogError(StsemError):
 
 
 class ChannelError(LogError):
-    """A channel is missing, ambiguous or of the wrong kind."""
+    """A channel is missing, ambiguous or of the wrong kind.
+
+    Args:
+        message: the sentence.
+        role: what it was wanted for: color, depth, pose or labels; "" for none of them.
+        rivals: topics with an equal claim to the role; empty when the trouble is another.
+    """
+
+    def __init__(self, message: str, role: str = "", rivals: tuple[str, ...] = ()) -> None:
+        self.role, self.rivals = role, rivals
+        super().__init__(message)
+
+
+class UndecodableError(ChannelError):
+    """None of the colour images can be decoded, so nothing can be measured."""
+
+    exit_code = EXIT_NOTHING_MEASURED
 
 
 class DecodeError(LogError):

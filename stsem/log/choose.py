@@ -1,26 +1,32 @@
 """Which channel is used as what: by schema, by what the first message holds, and by name."""
 
-import difflib
-import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from stsem.errors import ChannelError, UsageError
+from stsem.log import topicnames
 from stsem.log.pixels.look import Look
 from stsem.log.schemas.messages import Kind
+from stsem.log.topicnames import (
+    ALIGNED_WORDS,
+    COLOUR_WORDS,
+    INFRARED_WORDS,
+    INSTANCE_WORDS,
+    NO_DEPTH_WORDS,
+    NO_POSE_WORDS,
+    OVERLAY_WORDS,
+    PAINTED_WORDS,
+    SIDE_WORDS,
+    TRUTH_WORDS,
+)
 from stsem.log.tracks import IMAGES, Track
 
 ROLES = ("color", "depth", "pose", "labels")
-TRANSPORTS = frozenset({"compressed", "compresseddepth", "raw", "theora", "ffmpeg", "zstd", "draco"})
-LABEL_WORDS = ("label", "semantic", "segment", "seg", "class", "annotation", "mask", "groundtruth")
-DEPTH_WORDS = ("depth", "disparity")
-COLOUR_WORDS = frozenset({"color", "colour", "rgb", "bgr"})
-DULL_WORDS = frozenset(
-    {"infra", "infra1", "infra2", "ir", "thermal", "confidence", "debug", "overlay", "visualization"}
-)
-REGISTERED_WORDS = frozenset({"aligned", "registered", "rect"})
-POSE_EXCLUDED = frozenset({"goal", "target", "initial", "initialpose", "setpoint", "waypoint"})
+DULL_WORDS = INFRARED_WORDS | PAINTED_WORDS | OVERLAY_WORDS | NO_DEPTH_WORDS
+OTHERS_WORDS = INFRARED_WORDS | SIDE_WORDS | frozenset({"depth", "disparity"})
+"""In the name of a calibration, and not in that of the image: it is that of another camera."""
+RIVALS_NAMED = 5
 
 
 @dataclass(frozen=True)
@@ -38,31 +44,28 @@ class Candidate:
     @property
     def words(self) -> frozenset[str]:
         """Words of the topic, in lower case."""
-        return frozenset(re.findall(r"[a-z]+\d*|\d+", re.sub(r"([a-z])([A-Z])", r"\1_\2", self.topic).lower()))
+        return frozenset(topicnames.words(self.topic))
 
     @property
     def nature(self) -> str:
-        """What it looks like: "color", "depth", "labels", "video" or ""."""
-        named_labels = any(word.startswith(LABEL_WORDS) for word in self.words)
-        named_depth = any(word.startswith(DEPTH_WORDS) for word in self.words)
-        order = self.look.order
+        """What it looks like: "color", "depth", "labels", "video"; or nothing, as ids of things and overlays are."""
+        told, order = topicnames.told(self.topic), self.look.order
+        floats = order == "metric" and self.look.bits != 16
+        if order == "labels" or (told == "labels" and order not in ("video", "spoilt") and not floats):
+            of_things = self.words & INSTANCE_WORDS and "semantic" not in self.words
+            return "" if of_things or self.words & OVERLAY_WORDS else "labels"
         if order == "metric":
-            return "labels" if named_labels and self.look.bits == 16 else "depth"
+            return "" if self.words & (INFRARED_WORDS | NO_DEPTH_WORDS) else "depth"
         if order in ("rgb", "bgr", "grey"):
-            return "labels" if named_labels else "" if named_depth else "color"
+            return "" if told == "depth" else "color"
         if order == "unknown":
-            return "labels" if named_labels else "depth" if named_depth else "color"
+            return told or "color"
         return order
 
     @property
     def base(self) -> tuple[str, ...]:
         """The camera it belongs to: the topic without transport and without image_*."""
-        parts = [part for part in self.topic.split("/") if part]
-        while len(parts) > 1 and parts[-1].lower() in TRANSPORTS:
-            parts.pop()
-        if len(parts) > 1 and parts[-1].lower().startswith("image"):
-            parts.pop()
-        return tuple(parts)
+        return topicnames.camera(self.topic)
 
     @property
     def claim(self) -> tuple[bool, bool, bool]:
@@ -84,14 +87,18 @@ def check_overrides(topics: Mapping[str, str], tracks: Sequence[Track]) -> dict[
             raise UsageError(f"--topic names the role {role!r}, but the roles are {', '.join(ROLES)}.")
         fitting = [track for track in tracks if track.topic == topic]
         if not fitting:
-            raise ChannelError(f"The log has no topic {topic!r} for {role}; it has {_nearest_first(topic, tracks)}.")
+            near = topicnames.nearest_first(topic, (track.topic for track in tracks))
+            raise ChannelError(
+                f"The log has no topic {topic!r} for {role}; it has {', '.join(near) or 'no topic at all'}.", role
+            )
         kinds = (Kind.POSE, Kind.TRANSFORMS) if role == "pose" else IMAGES
         track = max(fitting, key=lambda t: (t.kind in kinds, t.count))
         if track.kind not in kinds:
             what = "poses or transforms" if role == "pose" else "images"
             raise ChannelError(
                 f"{topic} was given for {role}, which needs {what}, but it holds {track.schema or 'no schema'} "
-                f"({track.encoding}); {track.trouble or 'choose another topic'}."
+                f"({track.encoding}); {track.trouble or 'choose another topic'}.",
+                role,
             )
         chosen[role] = track
     return chosen
@@ -112,20 +119,25 @@ def choose_color(images: Sequence[Candidate], everything: Sequence[Track]) -> Ca
         if videos:
             raise ChannelError(
                 f"The only camera {videos[0].topic} holds {videos[0].look.name} video, which stsem does not decode; "
-                "record or convert it as jpeg, png or raw images."
+                "record or convert it as jpeg, png or raw images.",
+                "color",
             )
         there = (
             ", ".join(f"{t.topic} ({t.schema or t.encoding}, {t.count} messages)" for t in everything)
             or "no channel at all"
         )
-        raise ChannelError(f"The log has no colour images; it has {there}; give --topic color=TOPIC if one of them is.")
+        raise ChannelError(
+            f"The log has no colour images; it has {there}; give --topic color=TOPIC if one of them is.", "color"
+        )
     best = [max(group, key=_within_camera) for group in cameras.values()]
     claim = max(candidate.claim for candidate in best)
     rivals = sorted((c for c in best if c.claim == claim), key=lambda c: c.topic)
     if len(rivals) > 1:
         names = ", ".join(f"{c.topic} ({c.track.count} messages)" for c in rivals)
         raise ChannelError(
-            f"{len(rivals)} cameras could be the colour camera: {names}; choose one with --topic color=TOPIC."
+            f"{len(rivals)} cameras could be the colour camera: {names}; choose one with --topic color=TOPIC.",
+            "color",
+            tuple(c.topic for c in rivals),
         )
     return rivals[0]
 
@@ -137,16 +149,21 @@ def _within_camera(candidate: Candidate) -> tuple[int, bool, str]:
 def choose_partner(images: Iterable[Candidate], nature: str, color: Candidate) -> tuple[Candidate | None, str]:
     """(the channel of `nature` "depth" or "labels" nearest to the colour camera, a warning or "").
 
-    Nearest: in the colour camera's frame, registered by name, the longest common beginning of the topic, the same
-    base, most messages; at last by name, with a warning.
+    Nearest depth: in the colour camera's frame, aligned by name, the longest common beginning of the topic, most
+    messages. Labels of classes before those with things, ids before painted ones. At last by name, with a warning.
     """
-    found = [c for c in images if c.nature == nature and c.track.count]
+    found = sorted((c for c in images if c.nature == nature and c.track.count), key=lambda c: c.topic)
     if not found:
         return None, ""
 
-    def nearness(c: Candidate) -> tuple[bool, bool, int, int]:
+    def nearness(c: Candidate) -> tuple[int, ...]:
         same_frame = bool(c.look.frame_id) and c.look.frame_id == color.look.frame_id
-        return same_frame, bool(c.words & REGISTERED_WORDS), _common(c.base, color.base), c.track.count
+        place = topicnames.common(c.base, color.base), c.track.count
+        if nature == "labels":
+            of_classes = not c.words & (INSTANCE_WORDS | {"panoptic"})
+            ids = not c.words & PAINTED_WORDS, c.look.order in ("grey", "metric")
+            return (of_classes, *ids, same_frame, *place)
+        return (same_frame, bool(c.words & ALIGNED_WORDS), *place)
 
     return _best(found, nearness, nature)
 
@@ -154,67 +171,67 @@ def choose_partner(images: Iterable[Candidate], nature: str, color: Candidate) -
 def _best(
     found: Sequence[Candidate], key: Callable[[Candidate], tuple[int, ...]], nature: str
 ) -> tuple[Candidate, str]:
-    ordered = sorted(found, key=lambda c: c.topic)
-    best = max(ordered, key=key)
-    rivals = [c.topic for c in ordered if key(c) == key(best)]
-    warning = ""
-    if len(rivals) > 1:
-        warning = (
-            f"{', '.join(rivals)} could all be the {nature} channel; {best.topic} is used (--topic {nature}=TOPIC)."
-        )
-    return best, warning
+    best = max(found, key=key)
+    rivals = [c.topic for c in found if key(c) == key(best)]
+    if len(rivals) == 1:
+        return best, ""
+    return (
+        best,
+        f"{', '.join(rivals)} could all be the {nature} channel; {best.topic} is used (--topic {nature}=TOPIC).",
+    )
 
 
-def choose_calibration(tracks: Iterable[Track], color: Candidate) -> Track | None:
-    """The calibration that belongs to the colour camera: same frame, longest common topic, not another image's."""
-    found = [track for track in tracks if track.kind is Kind.CALIBRATION and track.calibrations]
-    color_is_depth = any(word.startswith(DEPTH_WORDS) for word in color.words)
+def choose_calibration(tracks: Iterable[Track], image: Candidate) -> Track | None:
+    """The calibration that belongs to an image channel: not another camera's by its name, in the same frame, with the
+    longest common beginning of the topic, most messages.
+
+    None when there is none but another camera's: one that names a depth, infrared, left or right camera which the image
+    is not, in another frame.
+    """
+
+    def foreign(track: Track) -> bool:
+        return bool((topicnames.words(track.topic) - image.words) & OTHERS_WORDS)
+
+    def same_frame(track: Track) -> bool:
+        return bool(image.look.frame_id) and track.calibrations[0].frame_id == image.look.frame_id
 
     def nearness(track: Track) -> tuple[bool, bool, int, int]:
-        same_frame = track.calibrations[0].frame_id == color.look.frame_id
-        other = any(word in track.topic.lower() for word in DEPTH_WORDS) and not color_is_depth
-        parts = tuple(part for part in track.topic.split("/") if part)
-        return not other, same_frame, _common(parts, color.base), track.count
+        place = topicnames.common(topicnames.parts(track.topic), image.base)
+        return not foreign(track), same_frame(track), place, track.count
 
-    return max(sorted(found, key=lambda t: t.topic), key=nearness, default=None)
+    found = [track for track in tracks if track.kind is Kind.CALIBRATION and track.calibrations]
+    fitting = [track for track in found if same_frame(track) or not foreign(track)]
+    return max(sorted(fitting, key=lambda t: t.topic), key=nearness, default=None)
 
 
 def choose_pose(tracks: Iterable[Track]) -> tuple[Track | None, str]:
-    """(the channel of stamped poses with most messages, a warning or ""); goals and the like are none."""
-    found = sorted(
-        (t for t in tracks if t.kind is Kind.POSE and t.transforms and not _words(t.topic) & POSE_EXCLUDED),
-        key=lambda t: (-t.count, t.topic),
-    )
+    """(the channel of poses to use, a warning that lists its rivals or ""); goals and the like are none.
+
+    Those named as the truth come first, then odometry (which names its child frame), then most messages.
+    """
+
+    def claim(track: Track) -> tuple[bool, bool, int]:
+        named = any(child for _, child in track.transforms)
+        return bool(topicnames.words(track.topic) & TRUTH_WORDS), named, track.count
+
+    found = [
+        track for track in tracks
+        if track.kind is Kind.POSE and track.transforms and not topicnames.words(track.topic) & NO_POSE_WORDS
+    ]  # fmt: skip
     if not found:
         return None, ""
-    if len(found) > 1 and found[1].count == found[0].count:
-        return found[
-            0
-        ], f"{found[0].topic} and {found[1].topic} could both be the pose; the first is used (--topic pose=TOPIC)."
-    return found[0], ""
-
-
-def _words(topic: str) -> frozenset[str]:
-    return frozenset(re.findall(r"[a-z]+", topic.lower()))
-
-
-def _common(a: Sequence[str], b: Sequence[str]) -> int:
-    """Length of the common beginning."""
-    same = 0
-    for x, y in zip(a, b, strict=False):
-        if x != y:
-            break
-        same += 1
-    return same
-
-
-def _nearest_first(topic: str, tracks: Sequence[Track]) -> str:
-    names = sorted({track.topic for track in tracks})
-    names.sort(key=lambda name: -difflib.SequenceMatcher(None, topic, name).ratio())
-    return ", ".join(names) or "no topic at all"
+    best, *rivals = sorted(sorted(found, key=lambda t: t.topic), key=claim, reverse=True)
+    if not rivals:
+        return best, ""
+    names = ", ".join(f"{track.topic} ({track.count})" for track in rivals[:RIVALS_NAMED])
+    more = f" and {len(rivals) - RIVALS_NAMED} more" if len(rivals) > RIVALS_NAMED else ""
+    return best, f"{best.topic} ({best.count} messages) is used for the pose, not {names}{more} (--topic pose=TOPIC)."
 
 
 def nearest_track(tracks: Iterable[Track], topic: str) -> Track | None:
     """The one of `tracks` whose topic has most in common with `topic`; None of none."""
-    parts = topic.split("/")
-    return max(sorted(tracks, key=lambda t: t.topic), key=lambda t: _common(t.topic.split("/"), parts), default=None)
+    names = topicnames.parts(topic)
+    return max(
+        sorted(tracks, key=lambda t: t.topic),
+        key=lambda t: topicnames.common(topicnames.parts(t.topic), names), default=None,
+    )  # fmt: skip

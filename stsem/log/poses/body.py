@@ -33,7 +33,8 @@ def is_body_name(frame: str) -> bool:
 def looks_like_body_frame(trajectory: Trajectory) -> bool:
     """Whether poses are likely those of a body: it moves along its own x axis, and its z axis is near the vertical.
 
-    Told only of 20 samples and a metre of path or more. A camera that looks down and is moved sideways is taken for a body.
+    Told only of 20 samples and a metre of path or more. A camera that looks down and is moved sideways is taken for
+    a body.
     """
     if len(trajectory) < MIN_SAMPLES:
         return False
