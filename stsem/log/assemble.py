@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from stsem.camera import Camera
-from stsem.errors import ChannelError, DecodeError, LogError, UsageError
+from stsem.errors import ChannelError, DecodeError, LogError, UndecodableError, UsageError
+from stsem.log.calibration import Optics, color_optics, own_optics
 from stsem.log.choose import (
     Candidate,
     check_overrides,
-    choose_calibration,
     choose_color,
     choose_partner,
     nearest_track,
@@ -24,12 +24,13 @@ from stsem.log.pixels import decode
 from stsem.log.plan import clock_offset_ns, out_of_range
 from stsem.log.poses.find import find_poses
 from stsem.log.poses.source import PoseSource
+from stsem.log.poses.tree import static_transform
 from stsem.log.reading import ImageChannel
+from stsem.log.registration import REGISTERED, DepthReader, View, claims_colour_pixels, depth_reader
 from stsem.log.scan import Scan
 from stsem.log.schemas.messages import Kind
+from stsem.log.sizes import usual_size
 from stsem.log.tracks import IMAGES, Track
-
-REGISTERED = ("auto", "yes", "no")
 
 
 @dataclass
@@ -39,9 +40,9 @@ class Assembly:
     Args:
         color, depth, labels: image channels; None when there is none or it cannot be used.
         size: (width, height) of the colour images.
+        optics: of the colour camera, for images of `size`.
+        depth_reader: brings depth onto the pixels of colour; None without depth.
         poses: where the camera's pose comes from.
-        calibration: the channel it was taken from.
-        camera: intrinsics for colour images of `size`.
         table: class table of the labels.
         clock_offsets_ns: topic -> what is taken out of its log times; only those that differ from 0.
         warnings: one sentence each.
@@ -51,9 +52,9 @@ class Assembly:
     size: tuple[int, int]
     depth: ImageChannel | None = None
     labels: ImageChannel | None = None
+    optics: Optics = field(default_factory=Optics)
+    depth_reader: DepthReader | None = None
     poses: PoseSource | None = None
-    calibration: Track | None = None
-    camera: Camera | None = None
     table: ClassTable | None = None
     clock_offsets_ns: dict[str, int] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
@@ -73,6 +74,7 @@ def assemble(
         UsageError: a value that cannot be.
         LogError: the files are not parts of one recording.
         ChannelError: no colour images, two cameras with an equal claim, or an asked-for topic that does not fit.
+        UndecodableError: no colour image can be decoded.
         ClassTableError: a class table that cannot be used.
     """
     if depth_registered not in REGISTERED:
@@ -89,11 +91,11 @@ def assemble(
     depth = _partner(others, asked, "depth", color, result.warnings)
     labels = _partner([c for c in others if c is not depth], asked, "labels", color, result.warnings)
     if depth is not None:
-        result.depth = _usable_depth(channels[id(depth.track)], depth, color, result, depth_registered)
+        result.depth = channels[id(depth.track)]
     if labels is not None:
         result.labels = channels[id(labels.track)]
     _find_classes(result, scan, classes_file)
-    _find_camera(result, tracks, color)
+    _find_optics(result, images, color, depth, tracks, depth_registered)
     result.poses, warnings = find_poses(tracks, asked.get("pose"), color.look.frame_id, result.color.rows.stamp_ns)
     result.warnings += warnings
     _find_clock_offsets(result)
@@ -143,47 +145,44 @@ def _partner(
 
 
 def _size(color: ImageChannel) -> tuple[int, int]:
-    """Size of the first colour image that can be decoded."""
-    found = color.first(lambda message: decode.colour(message).shape)
-    if found is None:
-        try:
-            color.read(0, decode.colour)
-        except DecodeError as err:
-            raise ChannelError(
-                f"No image of {color.topic} can be decoded: {err.reason}; choose another with --topic color=TOPIC."
-            ) from err
-        raise ChannelError(f"No image of {color.topic} can be decoded; choose another with --topic color=TOPIC.")
-    return found[1][1], found[1][0]
+    """Size of the colour images.
+
+    Raises:
+        UndecodableError: none can be decoded.
+    """
+    if size := usual_size(color, decode.colour):
+        return size
+    reason = ""
+    try:
+        color.read(0, decode.colour)
+    except DecodeError as err:
+        reason = f": {err.reason}"
+    raise UndecodableError(
+        f"No image of {color.topic} can be decoded{reason}; choose another with --topic color=TOPIC."
+    )
 
 
-def _usable_depth(
-    channel: ImageChannel, depth: Candidate, color: Candidate, result: Assembly, registered: str
-) -> ImageChannel | None:
-    """The depth channel if its pixels are those of the colour image."""
-    found = channel.first(lambda message: decode.depth(message).shape)
-    if found is None:
+def _find_optics(
+    result: Assembly, images: Sequence[Candidate], color: Candidate, depth: Candidate | None, tracks: Sequence[Track],
+    registered: str,
+) -> None:  # fmt: skip
+    """The colour camera's intrinsics, and how depth comes onto its pixels."""
+    size = usual_size(result.depth, decode.depth) if result.depth else None
+    claimed = depth and size and claims_colour_pixels(depth, size, color, result.size, registered)
+    result.optics = color_optics(tracks, images, color, result.size, depth if claimed else None)
+    result.warnings += result.optics.warnings
+    if depth is None:
+        return
+    if size is None:
         result.warnings.append(
-            f"No depth image of {channel.topic} can be decoded ({depth.look.name}): depth is not used."
+            f"No depth image of {depth.topic} can be decoded ({depth.look.name}): depth is not used."
         )
-        return None
-    height, width = found[1]
-    if registered == "no":
-        result.warnings.append(
-            f"{channel.topic} is not registered to the colour camera (--depth-registered no): not used."
-        )
-        return None
-    if (width, height) != result.size:
-        result.warnings.append(
-            f"{channel.topic} is {width}x{height} but colour is {result.size[0]}x{result.size[1]}: "
-            "depth of another size is not registered yet and not used."
-        )
-        return None
-    if registered == "auto" and depth.look.frame_id != color.look.frame_id:
-        result.warnings.append(
-            f"{channel.topic} is in frame {depth.look.frame_id!r} and colour in {color.look.frame_id!r}: "
-            "taken as registered, being of the same size (--depth-registered yes|no)."
-        )
-    return channel
+    else:
+        views = View(depth, size, own_optics(tracks, depth, size)), View(color, result.size, result.optics)
+        result.depth_reader, warnings = depth_reader(*views, registered, partial(static_transform, tracks))
+        result.warnings += warnings
+    if result.depth_reader is None:
+        result.depth = None
 
 
 def _find_classes(result: Assembly, scan: Scan, classes_file: Path | None) -> None:
@@ -204,34 +203,6 @@ def _find_classes(result: Assembly, scan: Scan, classes_file: Path | None) -> No
         result.warnings.append(
             f"{topic} holds labels, but no class table names them: accuracy cannot be measured (give --classes FILE)."
         )
-
-
-def _find_camera(result: Assembly, tracks: Sequence[Track], color: Candidate) -> None:
-    track = choose_calibration(tracks, color)
-    if track is None:
-        return
-    result.calibration = track
-    camera = next((c.camera for c in track.calibrations if c.camera), None)
-    if camera is None:
-        result.warnings.append(f"{track.topic} says that the camera is uncalibrated (K is zero): no intrinsics.")
-        return
-    if len(track.calibrations) > 1:
-        result.warnings.append(
-            f"{track.topic} changes {len(track.calibrations) - 1} times; the first calibration is used."
-        )
-    if camera.width <= 0 or camera.height <= 0:
-        camera = Camera(*result.size, camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion, camera.model)
-    if (camera.width, camera.height) != result.size:
-        result.warnings.append(
-            f"{track.topic} is for {camera.width}x{camera.height}, the images are {result.size[0]}x{result.size[1]}: "
-            "intrinsics are scaled."
-        )
-        camera = camera.scaled(*result.size)
-    if camera.is_distorted:
-        result.warnings.append(
-            f"{track.topic} states lens distortion ({camera.model or 'no model'}), which is not undone."
-        )
-    result.camera = camera
 
 
 def _note_troubles(result: Assembly, tracks: Sequence[Track]) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Self
 
 import numpy as np
 
@@ -36,7 +36,6 @@ from stsem.log.scan import scan
 from stsem.pose import Trajectory
 
 IMAGES_KEPT = AHEAD + 4
-A = TypeVar("A", Image, Depth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +71,8 @@ def open_log(
         paths: files, folders of files, or (as strings) addresses, of one recording.
         topics: role (color, depth, pose, labels) -> topic, where the choice by schema and name is not wanted.
         classes_file: class table (JSON or TOML) instead of the log's own.
-        depth_registered: whether depth pixels are colour pixels: yes, no, or auto (same size means yes).
+        depth_registered: whether depth pixels are colour pixels: yes, no (then only the log's extrinsic brings them
+            there), or auto (see `registration.depth_reader`).
         start_s, end_s: window in seconds from the first colour stamp, half-open.
         progress: called with (bytes done, bytes in all) during the scan.
 
@@ -91,7 +91,8 @@ def open_log(
     except BaseException as err:
         store.close()
         if isinstance(err, ChannelError) and scanned.damage.lossy:
-            raise ChannelError(f"{str(err).rstrip('.')}; the log is damaged: {scanned.damage}.") from err
+            sentence = f"{str(err).rstrip('.')}; the log is damaged: {scanned.damage}."
+            raise type(err)(sentence, err.role, err.rivals) from err
         raise
 
 
@@ -100,7 +101,7 @@ class Log:
 
     Attributes:
         classes: of the truth; None without labels or without a class table.
-        camera: intrinsics of the colour images; None when the log has none.
+        camera: pinhole camera of the frames' images; None when the log has none, or one whose lens is not understood.
         plans: one per colour frame in the window, in order of index.
         period_ns: median distance of colour stamps.
     """
@@ -108,13 +109,14 @@ class Log:
     def __init__(self, assembly: Assembly, info: LogInfo, store: Store, rows: slice) -> None:
         self._assembly, self._info, self._store, self._first = assembly, info, store, rows.start
         self._color, self._depth, self._poses = assembly.color, assembly.depth, assembly.poses
+        self._rectifier = assembly.optics.rectifier
         self._labels = assembly.labels if assembly.table else None
         self._translate = Translator(assembly.table) if assembly.table else None
         self._unknown_pixels: dict[int, int] = {}
         self._images: Recent[int, Image] = Recent(self._decode_image, IMAGES_KEPT)
         self._truths: Recent[int, Labels | None] = Recent(self._decode_truth, IMAGES_KEPT)
         self._partners, inexact = _pair(assembly)
-        self.camera: Camera | None = assembly.camera
+        self.camera: Camera | None = assembly.optics.camera
         self.classes: ClassSet | None = assembly.table.classes if assembly.table else None
         self.period_ns: int = median_period_ns(self._color.rows) or UNKNOWN_PERIOD_NS
         self.plans: tuple[FramePlan, ...] = _plans(assembly, self._partners, rows)
@@ -199,7 +201,7 @@ class Log:
 
     def _decode_image(self, row: int) -> Image:
         def convert(message: ImageMessage) -> Image:
-            return _of_size(decode.colour(message), self._assembly.size, "the first image")
+            return self._rectifier.image(decode.colour(message, self._assembly.size))
 
         return self._color.read(row, convert)
 
@@ -207,8 +209,13 @@ class Log:
         if self._labels is None or self._translate is None:
             return None
         translate = self._translate
+
+        def convert(message: ImageMessage) -> tuple[Labels, int]:
+            labels, unknown = translate(decode.labels(message))
+            return self._rectifier.labels(labels), unknown
+
         try:
-            labels, unknown = self._labels.read(row, lambda message: translate(decode.labels(message)))
+            labels, unknown = self._labels.read(row, convert)
         except DecodeError:
             return None
         if unknown:
@@ -226,14 +233,10 @@ class Log:
 
     def _decode_depth(self, row: int) -> Depth | None:
         partner = int(self._partners.depth[row])
-        if partner < 0 or self._depth is None:
+        if partner < 0 or self._depth is None or self._assembly.depth_reader is None:
             return None
-
-        def convert(message: ImageMessage) -> Depth:
-            return _of_size(decode.depth(message), self._assembly.size, "colour")
-
         try:
-            return self._depth.read(partner, convert)
+            return self._depth.read(partner, self._assembly.depth_reader)
         except DecodeError:
             return None
 
@@ -258,11 +261,3 @@ def _plans(assembly: Assembly, partners: Partners, rows: slice) -> tuple[FramePl
         assembly.labels.rows if assembly.labels else None, partners, assembly.poses, rows,
         (color, depth, pose, truth),
     )  # fmt: skip
-
-
-def _of_size(pixels: A, size: tuple[int, int], what: str) -> A:
-    """`pixels` if they are of `size` (width, height); ValueError otherwise."""
-    height, width = pixels.shape[:2]
-    if (width, height) != size:
-        raise ValueError(f"the image is {width}x{height}, but {what} is {size[0]}x{size[1]}")
-    return pixels

@@ -116,7 +116,7 @@ def test_an_undecodable_colour_image_is_an_error_of_its_frame_only(recorder: Cal
         for _ in range(2):
             first, bad, third, _ = everything(opened)
         assert bad.frame is None
-        assert str(bad.error) == f"/cam at {BASE_NS + PERIOD_NS} ns: the image is 16x12, but the first image is 32x24."
+        assert str(bad.error) == f"/cam at {BASE_NS + PERIOD_NS} ns: the image is 16x12, but 32x24 is expected."
         np.testing.assert_array_equal(bad.truth, label_picture(1))
         assert first.frame is not None
         assert third.frame is not None
@@ -242,7 +242,11 @@ def test_depth_of_another_size_is_not_used_and_said(recorder: Callable[..., Reco
     path = log.close()
     with open_log([path]) as opened:
         assert opened.plans[0].missing(BOTH) == ("depth", "pose")
-        assert "/depth is 16x12 but colour is 32x24" in opened.info.warnings[0]
+        assert opened.info.warnings[0] == (
+            "/depth (16x12, frame 'camera') is not on the pixels of /cam (32x24, frame 'camera'), and to register it "
+            "the log lacks a usable calibration of /depth and a usable calibration of /cam: depth is not used "
+            "(record that, or say --depth-registered yes if its pixels are those of colour)."
+        )
     with pytest.raises(UsageError, match="--depth-registered is 'maybe', but it can be auto, yes, no"):
         open_log([path], depth_registered="maybe")
 
