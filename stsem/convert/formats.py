@@ -4,8 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from stsem.convert import bags
+from stsem.convert import bags, camvid, cityscapes, kitti_step, scannet
 from stsem.convert.recording import Options, Progress, Summary
+from stsem.convert.write import dataset
 
 Convert = Callable[[Path, Path, Options, Progress], Summary]
 """Source, file to write, options, progress. Raises a StsemError of one sentence and then leaves no file behind."""
@@ -37,5 +38,18 @@ FORMATS: dict[str, Format] = {
     ),
     "rosbag2": Format(
         "ROS 2 bag in sqlite3", "a folder of .db3 or .db3.zstd files", bags.is_rosbag2, bags.convert_rosbag2
+    ),
+    "scannet": Format(
+        "ScanNet scan", "scene.sens, and label-filt/ with its table of classes", scannet.detect, dataset(scannet.read)
+    ),
+    "camvid": Format("CamVid", "train/ and trainannot/, or 701_StillsRaw_full/", camvid.detect, dataset(camvid.read)),
+    "cityscapes": Format(
+        "Cityscapes sequences",
+        "leftImg8bit_sequence/, gtFine/, camera/, disparity/",
+        cityscapes.detect,
+        dataset(cityscapes.read),
+    ),
+    "kitti-step": Format(
+        "KITTI-STEP", "image_02/ and panoptic_maps/, calib/, poses/", kitti_step.detect, dataset(kitti_step.read)
     ),
 }

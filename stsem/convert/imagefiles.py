@@ -49,9 +49,9 @@ class Truth:
 
 
 def natural(name: str) -> tuple[tuple[tuple[bool, int, str], ...], str]:
-    """Sorting key under which frame 9 comes before frame 10, however many zeros they have."""
+    """Sorting key under which frame 9 comes before frame 10, however many zeros they have; numbers before words."""
     parts = (part for part in _NUMBER.split(name) if part)
-    return tuple((True, int(p), "") if p.isdecimal() else (False, 0, p) for p in parts), name
+    return tuple((False, int(p), "") if p.isdecimal() else (True, 0, p) for p in parts), name
 
 
 def walk(root: Path, depth: int) -> Iterator[Path]:
