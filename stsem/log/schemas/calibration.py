@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 from stsem.camera import Camera
 from stsem.log.schemas.messages import Calibration
@@ -42,7 +42,7 @@ class Intrinsics:
 
     Args:
         width, height: of the full image.
-        K: 9 numbers, row by row; K[0] = 0 means uncalibrated.
+        K: 9 numbers, row by row; none, or K[0] = 0, means uncalibrated.
         D: distortion coefficients; as many as the model has, or none.
         model: distortion model, as the log names it.
         P: 12 numbers, row by row, of the projection after rectification; none, or P[0] = 0, means that there is none.
@@ -55,7 +55,7 @@ class Intrinsics:
     D: Sequence[float] = ()
     model: str = ""
     P: Sequence[float] = ()
-    readout: Readout = field(default_factory=Readout)
+    readout: Readout = Readout()
 
 
 def calibration(stamp_ns: int | None, frame_id: str, sensor: Intrinsics) -> Calibration:
@@ -65,13 +65,12 @@ def calibration(stamp_ns: int | None, frame_id: str, sensor: Intrinsics) -> Cali
         ValueError: K or P of another length, or a number that no camera has.
     """
     width, height = _sent_size(sensor)
-    k = _numbers("K", sensor.K, 9)
-    p = _numbers("P", sensor.P, 12) if len(sensor.P) else (0.0,) * 12
-    distortion, model = _distortion(sensor)
+    k, p = _numbers("K", sensor.K, 9), _numbers("P", sensor.P, 12)
     camera = _pinhole("K", width, height, (k[0], k[4], k[2], k[5]), sensor.readout)
     rectified = _pinhole("P", width, height, (p[0], p[5], p[2], p[6]), sensor.readout)
     if camera:
-        camera = Camera(width, height, camera.fx, camera.fy, camera.cx, camera.cy, distortion, model)
+        distortion, model = _distortion(sensor)
+        camera = replace(camera, distortion=distortion, model=model)
     return Calibration(stamp_ns, frame_id, camera, rectified)
 
 
@@ -79,8 +78,9 @@ def _sent_size(sensor: Intrinsics) -> tuple[int, int]:
     """(width, height) of the image after region of interest and binning; 0 where the message does not tell."""
     region, binning = sensor.readout.size, sensor.readout.binning
     full = (region[0] or sensor.width, region[1] or sensor.height)
-    if max(*full, *sensor.readout.offset) > MAX_SIDE:
-        raise ValueError(f"an image of {full[0]}x{full[1]} pixels is announced")
+    x, y = sensor.readout.offset
+    if max(*full, x, y) > MAX_SIDE:
+        raise ValueError(f"an image of {full[0]}x{full[1]} pixels at {x}, {y} is announced")
     sent = (full[0] // (binning[0] or 1), full[1] // (binning[1] or 1))
     if any(before and not after for before, after in zip(full, sent, strict=True)):
         raise ValueError(f"binning by {binning[0]}x{binning[1]} leaves nothing of {full[0]}x{full[1]} pixels")
@@ -88,16 +88,17 @@ def _sent_size(sensor: Intrinsics) -> tuple[int, int]:
 
 
 def _numbers(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
-    if len(values) != count:
+    """`values` if there are `count` of them; zeros if there are none."""
+    if len(values) not in (0, count):
         raise ValueError(f"{name} has {len(values)} numbers instead of {count}")
-    return tuple(float(value) for value in values)
+    return tuple(values) or (0.0,) * count
 
 
 def _distortion(sensor: Intrinsics) -> tuple[tuple[float, ...], str]:
     """(coefficients, model); nothing where there is no distortion. A fisheye is one even with coefficients of zero."""
     if len(sensor.D) > MAX_COEFFICIENTS:
         raise ValueError(f"D has {len(sensor.D)} numbers, more than any lens model")
-    coefficients = tuple(float(value) for value in sensor.D)
+    coefficients = tuple(sensor.D)
     if not all(math.isfinite(value) for value in coefficients):
         raise ValueError("D has a number that is not finite")
     model = MODELS.get(sensor.model.strip().lower(), sensor.model)

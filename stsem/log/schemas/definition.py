@@ -41,7 +41,7 @@ def check_layout(schema: Schema, expected: str) -> None:
         raise ValueError(f"a schema in {schema.encoding!r} cannot be read, only {' or '.join(HEADER)}")
     found, wanted = layout(schema.data.decode()), expected.format(header=HEADER[schema.encoding])
     if found != wanted:
-        raise ValueError(f"its layout is '{found or 'empty'}', but '{wanted}' was expected")
+        raise ValueError(f"its layout is '{found[:200] or 'empty'}', but '{wanted}' was expected")
 
 
 def layout(text: str) -> str:
@@ -67,7 +67,7 @@ class _Definitions:
                 name = _short(line[4:].strip())
                 self._lines.setdefault(name, [])
             elif not line.startswith("===="):
-                self._lines[name].append(line.split("#")[0].strip())
+                self._lines[name].append(line.partition("#")[0].strip())
         self._full = {name.rpartition("/")[2]: name for name in self._lines}
 
     def layout(self, name: str, above: tuple[str, ...]) -> str:

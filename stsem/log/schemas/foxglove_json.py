@@ -1,6 +1,7 @@
 """foxglove messages in JSON: text to a mapping of fields."""
 
 import json
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +11,7 @@ from stsem.log.schemas import foxglove
 from stsem.log.schemas.foxglove import Fields
 from stsem.log.schemas.messages import Decoded
 
+DATA = re.compile(rb'"data"\s*:\s*"')
 MAX_VALUES = 100_000
 """Separators in one message: pixels are one text in base64, and thousands of transforms have fewer."""
 
@@ -20,11 +22,20 @@ def reader(convert: Callable[[Fields], Decoded]) -> Callable[[Schema], Callable[
 
 
 def stamp_reader(_: Schema) -> Callable[[memoryview], int | None]:
-    """Makes the reader of the field `timestamp`; the whole text is parsed for it."""
-    return lambda payload: foxglove.stamp(parse(payload))
+    """Makes the reader of the field `timestamp`; everything but the pixels is parsed for it."""
+    return lambda payload: foxglove.stamp(parse(without_data(bytes(payload))))
 
 
-def parse(payload: memoryview) -> dict[str, Any]:
+def without_data(raw: bytes) -> bytes:
+    """`raw` with an empty text in the field `data`, if it is plainly one; as it is otherwise."""
+    begin = DATA.search(raw)
+    if begin is None:
+        return raw
+    end = raw.find(b'"', begin.end())
+    return raw if end < 0 or raw[end - 1] == ord("\\") else raw[: begin.end()] + raw[end:]
+
+
+def parse(payload: memoryview | bytes) -> dict[str, Any]:
     """The object that `payload` holds.
 
     Raises:
