@@ -16,6 +16,7 @@ from stsem.convert.imagefiles import (
     count,
     events,
     files,
+    first_folders,
     natural,
     read_text,
     stated_truth,
@@ -61,7 +62,7 @@ PUBLISHED: dict[str, tuple[tuple[int, int, int], str | None]] = {
 
 def detect(source: Path) -> bool:
     """Whether it has `train` and `trainannot` (or val, test), or `701_StillsRaw_full`."""
-    return source.is_dir() and any(_raw_folder(folder) or _splits(folder) for folder in walk(source, _LEVELS))
+    return source.is_dir() and any(_raw_folder(folder) or _splits(folder) for folder in first_folders(source, _LEVELS))
 
 
 def read(source: Path, options: Options) -> Recording:

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from stsem.convert.imagefiles import (
     count,
     events,
     files,
+    first_folders,
     image_size,
     read_text,
     truth_of,
@@ -61,7 +62,7 @@ class _Found:
 
 def detect(source: Path) -> bool:
     """Whether a file named like `aachen_000000_000019_leftImg8bit.png` lies in it."""
-    return source.is_dir() and any(kind == COLOR for _, _, kind, _ in _listing(source))
+    return source.is_dir() and any(kind == COLOR for _, _, kind, _ in _listing(first_folders(source, _LEVELS)))
 
 
 def read(source: Path, options: Options) -> Recording:
@@ -71,7 +72,7 @@ def read(source: Path, options: Options) -> Recording:
         ConversionError: no images, no clear choice of a sequence, or a camera file that cannot be read.
     """
     sequences: dict[str, _Found] = {}
-    for sequence, frame, kind, path in _listing(source):
+    for sequence, frame, kind, path in _listing(walk(source, _LEVELS)):
         sequences.setdefault(sequence, _Found()).of.setdefault(kind, {}).setdefault(frame, path)
     sequences = {name: found for name, found in sequences.items() if found.get(COLOR)}
     if not sequences:
@@ -93,9 +94,9 @@ def read(source: Path, options: Options) -> Recording:
     )
 
 
-def _listing(source: Path) -> Iterator[tuple[str, int, str, Path]]:
+def _listing(folders: Iterable[Path]) -> Iterator[tuple[str, int, str, Path]]:
     """(sequence, frame number, kind, path) of everything that is named as in Cityscapes."""
-    for folder in walk(source, _LEVELS):
+    for folder in folders:
         for path in files(folder, (".png", ".json")):
             if match := _NAME.fullmatch(path.name):
                 yield match["sequence"], int(match["frame"]), match["kind"], path

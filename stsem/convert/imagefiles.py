@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 MAX_FILE_BYTES = 256 << 20
 MAX_TEXT_BYTES = 16 << 20
 _LISTED = 8
+_LOOKED_AT = 500
 _Kind = tuple[str, Callable[["Capture"], Path | None], Callable[[int, bytes], Event]]
 _NUMBER = re.compile(r"(\d+)")
 
@@ -52,6 +54,11 @@ def natural(name: str) -> tuple[tuple[tuple[bool, int, str], ...], str]:
     """Sorting key under which frame 9 comes before frame 10, however many zeros they have; numbers before words."""
     parts = (part for part in _NUMBER.split(name) if part)
     return tuple((False, int(p), "") if p.isdecimal() else (True, 0, p) for p in parts), name
+
+
+def first_folders(root: Path, depth: int) -> Iterator[Path]:
+    """The first of `walk`, enough to tell what a data set is, few enough for a folder that is none."""
+    return islice(walk(root, depth), _LOOKED_AT)
 
 
 def walk(root: Path, depth: int) -> Iterator[Path]:

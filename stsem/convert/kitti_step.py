@@ -16,6 +16,7 @@ from stsem.convert.imagefiles import (
     count,
     events,
     files,
+    first_folders,
     image_size,
     read_text,
     truth_of,
@@ -33,7 +34,7 @@ _Matrix = npt.NDArray[np.float64]
 
 def detect(source: Path) -> bool:
     """Whether there is a folder `image_02` of sequences with `panoptic_maps` near it."""
-    names = {folder.name for folder in walk(source, _LEVELS)} if source.is_dir() else set()
+    names = {folder.name for folder in first_folders(source, _LEVELS)} if source.is_dir() else set()
     return {"image_02", "panoptic_maps"} <= names
 
 
