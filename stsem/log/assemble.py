@@ -21,7 +21,6 @@ from stsem.log.classtable import ClassTable, find_table
 from stsem.log.container.files import File
 from stsem.log.container.store import Store
 from stsem.log.pixels import decode
-from stsem.log.plan import clock_offset_ns, out_of_range
 from stsem.log.poses.find import find_poses
 from stsem.log.poses.source import PoseSource
 from stsem.log.poses.tree import static_transform
@@ -30,6 +29,7 @@ from stsem.log.registration import REGISTERED, DepthReader, View, claims_colour_
 from stsem.log.scan import Scan
 from stsem.log.schemas.messages import Kind
 from stsem.log.sizes import usual_size
+from stsem.log.stamps import clock_offsets, clock_warnings, refuse_restarted
 from stsem.log.tracks import IMAGES, Track
 
 
@@ -86,6 +86,7 @@ def assemble(
     color = _asked(images, asked, "color") or choose_color(images, tracks)
     result = Assembly(channels[id(color.track)], (0, 0))
     _refuse_unrelated(scan.files, result.color)
+    refuse_restarted(result.color)
     result.size = _size(result.color)
     others = [c for c in images if c is not color]
     depth = _partner(others, asked, "depth", color, result.warnings)
@@ -98,7 +99,7 @@ def assemble(
     _find_optics(result, images, color, depth, tracks, depth_registered)
     result.poses, warnings = find_poses(tracks, asked.get("pose"), color.look.frame_id, result.color.rows.stamp_ns)
     result.warnings += warnings
-    _find_clock_offsets(result)
+    _check_clocks(result, tracks)
     _note_troubles(result, tracks)
     return result
 
@@ -209,21 +210,10 @@ def _note_troubles(result: Assembly, tracks: Sequence[Track]) -> None:
     for track in tracks:
         if track.trouble:
             result.warnings.append(f"{track.trouble[0].upper()}{track.trouble[1:]}; its messages are not used.")
-    used = {c.topic for c in (result.color, result.depth, result.labels) if c} | {result.pose_topic}
-    for track in tracks:
-        if track.unstamped and track.topic in used:
-            result.warnings.append(
-                f"{track.unstamped} of {track.count} messages on {track.topic} have no capture stamp: "
-                "their log time is used."
-            )
 
 
-def _find_clock_offsets(result: Assembly) -> None:
-    offsets = {c.topic: clock_offset_ns(c.rows) for c in (result.color, result.depth, result.labels) if c}
-    if result.poses:
-        offsets[result.poses.topic] = out_of_range(result.poses.offset_ns())
-    result.clock_offsets_ns = {topic: offset for topic, offset in sorted(offsets.items()) if offset}
-    result.warnings += [
-        f"The clock of {topic} is off: its log times are {offset / 1e9:.3f} s behind its stamps or more; taken out."
-        for topic, offset in result.clock_offsets_ns.items()
-    ]
+def _check_clocks(result: Assembly, tracks: Sequence[Track]) -> None:
+    channels = [channel for channel in (result.color, result.depth, result.labels) if channel]
+    posing = [track for track in tracks if track.topic == result.pose_topic]
+    result.clock_offsets_ns = clock_offsets(channels, result.poses)
+    result.warnings += clock_warnings(result.color, result.depth, result.labels, posing, result.clock_offsets_ns)

@@ -1,15 +1,16 @@
-"""The clocks of a log: stamps of the sensors against log times of the recorder."""
+"""The clocks of a log: stamps that go back, and how far log times are from stamps."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from stsem.log.tracks import Int64
+from stsem.log.tracks import Int64, References
 
 RESET_NS = 1_000_000_000
 RESET_MESSAGES = 3
-MAX_RESETS = 100
-"""So many messages in a row behind the newest stamp: a clock that was set back; fewer are messages that came late."""
+"""A clock was set back when this many messages before and behind are apart: fewer are garbage, or came late."""
+MAX_CLOCK_OFFSET_NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -17,8 +18,8 @@ class Reset:
     """A clock that was set back.
 
     Args:
-        log_ns: log time of the first message after it.
-        back_ns: from the newest stamp before it to the stamp of that message.
+        log_ns: log time of the first message behind it.
+        back_ns: from the stamp before it to the stamp behind it.
     """
 
     log_ns: int
@@ -26,24 +27,22 @@ class Reset:
 
 
 def find_resets(stamps_ns: Int64, log_ns: Int64) -> tuple[Reset, ...]:
-    """Where stamps go back by more than a second while log time goes on: MAX_RESETS at most; (n,), in any order."""
+    """Where stamps go back by more than a second while log time goes on; (n,) each, in any order."""
+    if len(stamps_ns) < 2 * RESET_MESSAGES:
+        return ()
     order = np.argsort(log_ns, kind="stable")
     stamps, logs = stamps_ns[order], log_ns[order]
-    found: list[Reset] = []
-    start = 0
-    while len(found) < MAX_RESETS and (at := _first_reset(stamps[start:])) is not None:
-        newest = int(stamps[start : start + at].max())
-        found.append(Reset(int(logs[start + at]), newest - int(stamps[start + at])))
-        start += at
-    return tuple(found)
+    windows = sliding_window_view(stamps, RESET_MESSAGES)
+    before, behind = windows[:-RESET_MESSAGES], windows[RESET_MESSAGES:]
+    rows = np.flatnonzero(before.min(axis=1) - behind.max(axis=1) > RESET_NS) + RESET_MESSAGES
+    return tuple(Reset(int(logs[row]), int(stamps[row - 1] - stamps[row])) for row in rows)
 
 
-def _first_reset(stamps: Int64) -> int | None:
-    """First row that is, with those after it, far behind the newest stamp before it; None without one."""
-    newest = np.maximum.accumulate(stamps)
-    behind = newest - stamps > RESET_NS
-    if len(stamps) < RESET_MESSAGES + 1 or not behind.any():
-        return None
-    windows = np.lib.stride_tricks.sliding_window_view(behind, RESET_MESSAGES).all(axis=1)
-    rows = np.flatnonzero(windows)
-    return int(rows[0]) if len(rows) else None
+def clock_offset_ns(references: References) -> int:
+    """Smallest (log time - stamp) if it is below 0 or above 1 s, else 0: what is taken out of the log times."""
+    return out_of_range(int((references.log_ns - references.stamp_ns).min())) if len(references) else 0
+
+
+def out_of_range(offset_ns: int) -> int:
+    """`offset_ns` if it is below 0 or above 1 s, else 0."""
+    return 0 if 0 <= offset_ns <= MAX_CLOCK_OFFSET_NS else offset_ns

@@ -10,7 +10,6 @@ from stsem.log.poses.source import PoseSource
 from stsem.log.tracks import Int64, References
 
 MAX_DEPTH_OFFSET_NS = 20_000_000
-MAX_CLOCK_OFFSET_NS = 1_000_000_000
 UNKNOWN_PERIOD_NS = 100_000_000
 MAX_CANDIDATES = 16
 NEEDS = frozenset({"depth", "pose"})
@@ -67,9 +66,13 @@ def median_period_ns(references: References) -> int | None:
 
 def pair_depth(color: References, depth: References) -> Int64:
     """Row in `depth` for each colour frame: nearest stamp within min(20 ms, half a depth period), used once."""
+    return pair(color.stamp_ns, depth.stamp_ns, depth_limit_ns(color, depth))
+
+
+def depth_limit_ns(_: References, depth: References) -> int:
+    """How far a depth image may be from its colour image: 20 ms, or half a depth period where that is less."""
     period = median_period_ns(depth)
-    limit = MAX_DEPTH_OFFSET_NS if period is None else min(MAX_DEPTH_OFFSET_NS, period // 2)
-    return pair(color.stamp_ns, depth.stamp_ns, limit)
+    return MAX_DEPTH_OFFSET_NS if period is None else min(MAX_DEPTH_OFFSET_NS, period // 2)
 
 
 def pair_truth(color: References, truth: References) -> tuple[Int64, int]:
@@ -80,11 +83,15 @@ def pair_truth(color: References, truth: References) -> tuple[Int64, int]:
     partners = pair(color.stamp_ns, truth.stamp_ns, 0)
     free_color = np.flatnonzero(partners < 0)
     free_truth = np.setdiff1d(np.arange(len(truth)), partners)
-    limit = (median_period_ns(color) or UNKNOWN_PERIOD_NS) // 2
-    near = pair(color.stamp_ns[free_color], truth.stamp_ns[free_truth], limit)
+    near = pair(color.stamp_ns[free_color], truth.stamp_ns[free_truth], truth_limit_ns(color, truth))
     found = near >= 0
     partners[free_color[found]] = free_truth[near[found]]
     return partners, int(found.sum())
+
+
+def truth_limit_ns(color: References, _: References) -> int:
+    """How far a label image may be from its colour image: half a colour period."""
+    return (median_period_ns(color) or UNKNOWN_PERIOD_NS) // 2
 
 
 def pair(wanted: Int64, offered: Int64, limit_ns: int) -> Int64:
@@ -108,16 +115,6 @@ def pair(wanted: Int64, offered: Int64, limit_ns: int) -> Int64:
         if partners[owner[k]] < 0 and not used[rows[k]]:
             partners[owner[k]], used[rows[k]] = rows[k], True
     return partners
-
-
-def clock_offset_ns(references: References) -> int:
-    """Smallest (log time - stamp) if it is below 0 or above 1 s, else 0: what is taken out of the log times."""
-    return out_of_range(int((references.log_ns - references.stamp_ns).min())) if len(references) else 0
-
-
-def out_of_range(offset_ns: int) -> int:
-    """`offset_ns` if it is below 0 or above 1 s, else 0."""
-    return 0 if 0 <= offset_ns <= MAX_CLOCK_OFFSET_NS else offset_ns
 
 
 def window(stamps_ns: Int64, start_s: float | None, end_s: float | None) -> slice:

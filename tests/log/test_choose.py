@@ -29,15 +29,15 @@ def record(path: Path, topics: dict[str, str], frames: int = 3) -> Path:
             kind, _, frame = kind.partition("@")
             frame = frame or "camera"
             match kind:
-                case "rgb" | "mono" | "depth" | "bayer" | "labels":
+                case "rgb" | "mono" | "depth" | "odd" | "labels":
                     encoding = {
                         "rgb": "rgb8",
                         "mono": "mono8",
                         "depth": "16UC1",
-                        "bayer": "bayer_rggb8",
+                        "odd": "tetrachrome",
                         "labels": "mono8",
                     }
-                    pixels = {"rgb": picture(i), "bayer": picture(i), "depth": DEPTH}.get(kind, label_picture(i))
+                    pixels = {"rgb": picture(i), "odd": picture(i), "depth": DEPTH}.get(kind, label_picture(i))
                     log.ros(topic, IMAGE, ROS.image(stamp, pixels, encoding[kind], frame_id=frame), stamp)
                 case "jpeg":
                     log.ros(topic, COMPRESSED, ROS.compressed(stamp, jpeg(i), "jpeg", frame), stamp)
@@ -127,7 +127,7 @@ def test_two_equal_cameras_are_listed(tmp_path: Path) -> None:
             "no colour images; it has /pose (geometry_msgs/msg/PoseStamped, 3 messages); give --topic color=TOPIC",
         ),
         ({"/cam/h264": "h264"}, "The only camera /cam/h264 holds h264 video, which stsem does not decode"),
-        ({"/cam": "bayer"}, "No image of /cam can be decoded: encoding 'bayer_rggb8' is not supported, only rgb8"),
+        ({"/cam": "odd"}, "No image of /cam can be decoded: encoding 'tetrachrome' is not supported, only rgb8"),
     ],
 )
 def test_logs_without_usable_colour(tmp_path: Path, topics: dict[str, str], words: str) -> None:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stsem.errors import UsageError
-from stsem.log.plan import FramePlan, clock_offset_ns, median_period_ns, pair, pair_depth, pair_truth, window
+from stsem.log.plan import FramePlan, median_period_ns, pair, pair_depth, pair_truth, window
 from stsem.log.tracks import References
 
 TIMES = st.lists(st.integers(0, 200), max_size=12).map(sorted)
@@ -85,13 +85,6 @@ def test_a_plan_arrives_with_the_last_of_what_is_needed() -> None:
     assert bare.missing(both) == ("depth", "pose")
     assert bare.missing(frozenset({"pose"})) == ("pose",)
     assert not bare.has_truth
-
-
-@pytest.mark.parametrize(
-    ("late", "taken_out"), [(0, 0), (25_000_000, 0), (1_000_000_000, 0), (1_000_000_001, 1_000_000_001), (-1, -1)]
-)
-def test_clock_offsets_below_0_or_above_a_second_are_taken_out(late: int, taken_out: int) -> None:
-    assert clock_offset_ns(refs([10, 20, 30], [10 + late + 5, 20 + late, 30 + late + 7])) == taken_out
 
 
 def test_the_window_is_half_open_and_counts_from_the_first_stamp() -> None:

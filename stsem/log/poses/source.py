@@ -91,8 +91,11 @@ class PoseSource:
         return Trajectory(stamps, self.poses(stamps), broken if broken.any() else None)
 
     def offset_ns(self) -> int:
-        """Smallest (log time - stamp) of the moving edges' samples."""
-        return min(int((edge.log_ns - edge.trajectory.stamps_ns).min()) for edge in self.moving)
+        """Smallest (log time - stamp) of a moving edge; of several, that of the edge on which it is nearest to 0.
+
+        An edge whose publisher dates its transforms ahead or late (localisation does) says nothing about the clock.
+        """
+        return min((int((edge.log_ns - edge.trajectory.stamps_ns).min()) for edge in self.moving), key=abs)
 
 
 def compose(edges: Sequence[Edge], stamps_ns: Int64) -> Pose:
