@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from stsem.convert import bags, camvid, cityscapes, kitti_step, scannet
+from stsem.convert import bags, camvid, cityscapes, icl_nuim, images, kitti_step, nice_slam, scannet, tum
 from stsem.convert.recording import Options, Progress, Summary
 from stsem.convert.write import dataset
 
@@ -39,6 +39,19 @@ FORMATS: dict[str, Format] = {
     "rosbag2": Format(
         "ROS 2 bag in sqlite3", "a folder of .db3 or .db3.zstd files", bags.is_rosbag2, bags.convert_rosbag2
     ),
+    "tum": Format("TUM RGB-D", "rgb.txt, depth.txt, groundtruth.txt", tum.detect, dataset(tum.read)),
+    "icl-nuim": Format(
+        "ICL-NUIM, TUM-compatible",
+        "associations.txt, rgb/, depth/, *.gt.freiburg",
+        icl_nuim.detect,
+        dataset(icl_nuim.read),
+    ),
+    "nice-slam": Format(
+        "Replica as NICE-SLAM rendered it",
+        "results/frame*.jpg, results/depth*.png, traj.txt, cam_params.json",
+        nice_slam.detect,
+        dataset(nice_slam.read),
+    ),
     "scannet": Format(
         "ScanNet scan", "scene.sens, and label-filt/ with its table of classes", scannet.detect, dataset(scannet.read)
     ),
@@ -51,5 +64,12 @@ FORMATS: dict[str, Format] = {
     ),
     "kitti-step": Format(
         "KITTI-STEP", "image_02/ and panoptic_maps/, calib/, poses/", kitti_step.detect, dataset(kitti_step.read)
+    ),
+    "images": Format(
+        "a folder of images",
+        "rgb/, depth/, labels/, poses.txt, classes.json, camera.json; or images alone",
+        images.detect,
+        dataset(images.read),
+        last=True,
     ),
 }

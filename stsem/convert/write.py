@@ -15,14 +15,18 @@ from stsem.convert.recording import (
     Summary,
     TruthEvent,
 )
+from stsem.convert.rigid import is_rigid
 from stsem.errors import ConversionError
 from stsem.frame import Image
-from stsem.log.pixels import formats
+from stsem.log.pixels import decode, formats
 from stsem.log.schemas.messages import CompressedImage
 from stsem.log.writer import COLOR, LogWriter
 
 MAX_STAMP_NS = (1 << 32) * 10**9
 _Measured = ColorEvent | DepthEvent | TruthEvent | PoseEvent
+_NAMES: dict[type[_Measured], str] = {
+    ColorEvent: "colour images", DepthEvent: "depth images", TruthEvent: "label images", PoseEvent: "poses"
+}  # fmt: skip
 
 
 def dataset(read: Callable[[Path, Options], Recording]) -> Callable[[Path, Path, Options, Progress], Summary]:
@@ -37,32 +41,76 @@ def dataset(read: Callable[[Path, Options], Recording]) -> Callable[[Path, Path,
 def write_recording(recording: Recording, out: Path, progress: Progress) -> Summary:
     """Write a data set as a log; log times are the stamps, as files do not say when a message arrived.
 
-    An event whose stamp is behind that of the one before, or cannot be written, is left out and counted.
+    An event that is not what it should be (see `_Check`) is left out and counted.
 
     Raises:
         ConversionError: there is no colour image in it; OutputError: the file cannot be written.
     """
     losses: Counter[str] = Counter()
-    last_ns: int | None = None
+    check = _Check()
     with LogWriter(out, recording.classes, declared=()) as log:
         for done, event in enumerate(recording.events, 1):
             if isinstance(event, Loss):
                 losses[event.what] += event.count
-            elif not 0 <= event.stamp_ns < MAX_STAMP_NS:
-                losses["messages with stamps before 1970 or after 2106"] += 1
-            elif last_ns is not None and event.stamp_ns < last_ns:
-                losses["messages whose stamp is behind the one before"] += 1
+            elif fault := check(event):
+                losses[f"{_NAMES[type(event)]} {fault}"] += 1
             else:
-                if last_ns is None:
+                if not log.counts:
                     _write_cameras(log, recording, event.stamp_ns)
                 _write(log, event)
-                last_ns = event.stamp_ns
             progress(min(done, recording.count), recording.count)
         if not log.counts.get(COLOR):
             lost = "; ".join(f"{count} {what}" for what, count in losses.items())
             raise ConversionError(f"No colour image could be read ({lost or 'there is none'}): no log was written.")
         counts = dict(log.counts)
     return Summary(counts, dict(losses), tuple(recording.notes))
+
+
+class _Check:
+    """What is wrong with an event, "" when nothing is: every one is checked before it is written.
+
+    Colour images are decoded once, so that a log from stsem never holds an image that stsem cannot read.
+    """
+
+    def __init__(self) -> None:
+        self._sizes: dict[type[_Measured], tuple[int, ...]] = {}
+        self._last_ns = 0
+
+    def __call__(self, event: _Measured) -> str:
+        if not 0 <= event.stamp_ns < MAX_STAMP_NS:
+            return "with a stamp before 1970 or after 2106"
+        if event.stamp_ns < self._last_ns:
+            return "whose stamp is behind the one before"
+        if isinstance(event, PoseEvent):
+            fault = "" if is_rigid(event.T_WC) else "that are none (not finite, or not a rotation)"
+        else:
+            fault = self._image_fault(event)
+        if not fault:
+            self._last_ns = event.stamp_ns
+        return fault
+
+    def _image_fault(self, event: ColorEvent | DepthEvent | TruthEvent) -> str:
+        try:
+            shape = _shape(event)
+        except ValueError:
+            return "that cannot be decoded"
+        if shape != self._sizes.setdefault(type(event), shape):
+            return "of another size than the first"
+        return ""
+
+
+def _shape(event: ColorEvent | DepthEvent | TruthEvent) -> tuple[int, ...]:
+    match event:
+        case ColorEvent(image=image):
+            return (decode.colour(_message(image)) if isinstance(image, bytes) else image).shape
+        case DepthEvent(depth=depth):
+            return depth.shape
+        case TruthEvent(labels=labels):
+            return labels.shape
+
+
+def _message(data: bytes) -> CompressedImage:
+    return CompressedImage(None, "", "", memoryview(data))
 
 
 def _write_cameras(log: LogWriter, recording: Recording, stamp_ns: int) -> None:
@@ -87,7 +135,6 @@ def _write(log: LogWriter, event: _Measured) -> None:
 
 def _write_color(log: LogWriter, stamp_ns: int, image: bytes | Image) -> None:
     if isinstance(image, bytes):
-        form = formats.file_format(CompressedImage(None, "", "", memoryview(image)))
-        log.color_file(stamp_ns, stamp_ns, image, form)
+        log.color_file(stamp_ns, stamp_ns, image, formats.file_format(_message(image)))
     else:
         log.color_pixels(stamp_ns, stamp_ns, image)
