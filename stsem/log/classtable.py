@@ -20,6 +20,8 @@ ATTACHMENT = "classes.json"
 FORMS = 'a list of names, {"names": [...]}, {id: name} or {name: "#rrggbb id"}'
 _PALETTE = re.compile(r"#([0-9a-fA-F]{6})(?:\s+(\d+))?")
 _UNKNOWN = 254
+OUTSIDE = 65535
+"""What an id becomes in a label image that 16 bits cannot hold."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class ClassTable:
     Args:
         classes: in the order of their raw ids.
         raw_ids: the id that each class has in the label images, ascending.
-        ignored: raw ids that mean "ignore this pixel", beside 255.
+        ignored: raw ids that mean "ignore this pixel", beside 255; one that 16 bits cannot hold stands for all such.
         source: where it was found, for people.
     """
 
@@ -73,7 +75,8 @@ class Translator:
     def _ids(self, size: int) -> Labels:
         if size not in self._by_id:
             lut = np.full(size, _UNKNOWN, np.uint8)
-            lut[[raw for raw in (NO_LABEL, *self._table.ignored) if raw < size]] = NO_LABEL
+            ignored = (raw if 0 <= raw < OUTSIDE else OUTSIDE for raw in (NO_LABEL, *self._table.ignored))
+            lut[[raw for raw in ignored if raw < size]] = NO_LABEL
             for own, raw in enumerate(self._table.raw_ids):
                 if raw < size:
                     lut[raw] = own
@@ -173,7 +176,7 @@ def parse(document: Any, source: str) -> ClassTable:
         if isinstance(document, dict) and document and not all(str(key).isdecimal() for key in document):
             return _from_palette(document, source)
         return from_names(_by_id(document), {}, (), source)
-    except (TypeError, ValueError, AttributeError, KeyError) as err:
+    except (TypeError, ValueError, AttributeError, KeyError, ArithmeticError) as err:
         raise ClassTableError(f"The class table {source} cannot be read ({err}); it should hold {FORMS}.") from err
 
 

@@ -52,6 +52,10 @@ def test_every_form_is_the_same_table(document: object) -> None:
         ({"70000": "far"}, "ids go from 0 to 65535"),
         ({"names": ["a"], "colours": [[1, 2, 300]]}, "is not a colour"),
         (None, "should hold"),
+        ({"names": ["a"], "ignore_id": 1e999}, "should hold"),
+        ({"names": ["a"], "ignore_id": float("nan")}, "should hold"),
+        ({"9" * 5000: "far"}, "should hold"),
+        ({"wall": "#0a141e 9999999"}, "ids go from 0 to 65535"),
     ],
 )
 def test_what_is_no_table_is_refused(document: object, words: str) -> None:
@@ -129,3 +133,31 @@ def test_255_classes_leave_no_room_to_count_but_are_translated() -> None:
     labels, unknown = Translator(table_of({i: f"c{i}" for i in range(255)}))(np.arange(256, dtype=np.uint8)[None])
     assert labels[0].tolist() == list(range(256))
     assert unknown == 0
+
+
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8) | st.just("names"), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+@settings(max_examples=200)
+@given(document=plain)
+def test_any_document_is_a_table_or_a_refusal(document: object) -> None:
+    try:
+        table = parse(document, "test")
+    except ClassTableError as err:
+        assert str(err).startswith("The class table test")  # noqa: PT017
+        return
+    labels, _ = Translator(table)(np.arange(65536, dtype=np.uint16).reshape(256, 256))
+    assert labels[0, 255] == NO_LABEL
+
+
+def test_an_ignored_id_that_16_bits_cannot_hold_stands_for_all_such() -> None:
+    for ignored in (-1, -300, 1 << 20):
+        translate = Translator(parse({"names": ["a", "b"], "ignore_id": ignored}, "test"))
+        assert translate(np.array([[0, 1, 7, 65535]], np.uint16))[1] == 1
+        assert translate(np.array([[0, 1, 7, 255]], np.uint8))[1] == 1

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from stsem.classes import Colour
 from stsem.frame import Depth, Image
+from stsem.log.classtable import OUTSIDE
 from stsem.log.pixels.compressed_depth import compressed_depth
 from stsem.log.pixels.encodings import Array, Packed
 from stsem.log.pixels.formats import JPEG, PNG, WEBP, file_format, refusal
@@ -21,9 +22,6 @@ from stsem.log.pixels.raw import encoding_of, native, raw_colour, samples
 from stsem.log.pixels.sizes import Size
 from stsem.log.pixels.still import png_samples, still_colour
 from stsem.log.schemas.messages import CompressedImage, RawImage
-
-OUTSIDE = 65535
-"""What an id becomes that 16 bits cannot hold."""
 
 
 def colour(message: ImageMessage, size: Size | None = None) -> Image:

@@ -1,11 +1,14 @@
 """What jpeg and webp files state about themselves, read before they are decoded, and whether they are whole."""
 
+import re
 from dataclasses import dataclass
+from itertools import islice
 
 MAX_SCANS = 100
 """A progressive jpeg has about ten; each one more makes the decoder pass the whole image again."""
 
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0..SOF15; DHT, JPG and DAC lie between them
+_SCAN = re.compile(rb"\xff\xda")
 _BARE = frozenset({0x01, *range(0xD0, 0xD9)})  # markers without a length
 
 
@@ -51,8 +54,8 @@ def check_jpeg(data: memoryview) -> None:
     """
     if b"\xff\xd9" not in bytes(data[-4096:]):
         raise ValueError("the jpeg ends early")
-    if (scans := bytes(data).count(b"\xff\xda")) > MAX_SCANS:
-        raise ValueError(f"the jpeg has {scans} scans, but {MAX_SCANS} are the most allowed")
+    if next(islice(_SCAN.finditer(data), MAX_SCANS, None), None):
+        raise ValueError(f"the jpeg has more than {MAX_SCANS} scans, which no encoder makes")
 
 
 def webp_head(data: memoryview) -> Head:

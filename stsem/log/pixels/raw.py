@@ -59,8 +59,8 @@ def samples(message: RawImage, encoding: Packed, size: Size | None = None) -> Ar
 
 
 def native(pixels: Array) -> Array:
-    """`pixels` in this machine's byte order; a copy only if they are not."""
-    return pixels if pixels.dtype.isnative else pixels.astype(pixels.dtype.newbyteorder("="))
+    """`pixels` in this machine's byte order, at addresses it likes (OpenCV misreads others); a copy only if needed."""
+    return np.require(pixels, pixels.dtype.newbyteorder("="), "A")
 
 
 def _rows(message: RawImage, encoding: Planar, size: Size | None) -> Array:
