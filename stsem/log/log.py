@@ -208,10 +208,10 @@ class Log:
     def _decode_truth(self, row: int) -> Labels | None:
         if self._labels is None or self._translate is None:
             return None
-        translate = self._translate
+        translate, colours = self._translate, self.classes.colours if self.classes else ()
 
         def convert(message: ImageMessage) -> tuple[Labels, int]:
-            labels, unknown = translate(decode.labels(message))
+            labels, unknown = translate(decode.labels(message, colours))
             return self._rectifier.labels(labels), unknown
 
         try:
