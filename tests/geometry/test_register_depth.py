@@ -12,28 +12,9 @@ from hypothesis import strategies as st
 from stsem.camera import Camera
 from stsem.geometry.register_depth import DepthRegistration, register_depth
 from stsem.pose import Pose, from_quaternion, inverse
+from tests.made_up_lens import DEPTH, RIG, SAME, SMALL, WIDE, planes_seen
 
 Float64 = npt.NDArray[np.float64]
-DEPTH = Camera(160, 120, 130.0, 130.0, 79.5, 59.5)
-WIDE = Camera(320, 240, 240.0, 241.0, 158.0, 121.0)
-SAME = Camera(160, 120, 120.0, 120.5, 80.2, 58.8)
-SMALL = Camera(80, 60, 55.0, 55.0, 39.5, 29.5)
-RIG = from_quaternion((0.05, -0.01, 0.004), (0.01, -0.015, 0.02, 1.0))
-PLANES = (((0.1, -0.05, 1.0), 2.5), ((-0.4, 0.1, 1.0), 2.8), ((0.0, -0.9, 0.6), 1.4))
-"""(normal n, d) in the depth camera: n.X = d; what is seen is the nearest."""
-
-
-def planes_seen(camera: Camera, T_camera_depth: Pose) -> Float64:
-    """(H, W) analytic depth of the nearest of PLANES in front of a camera."""
-    y, x = np.mgrid[: camera.height, : camera.width]
-    rays = np.stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, np.ones(x.shape)], axis=-1)
-    depths = []
-    for normal, distance in PLANES:
-        n = T_camera_depth[:3, :3] @ np.array(normal)
-        with np.errstate(divide="ignore"):
-            z = (distance + n @ T_camera_depth[:3, 3]) / (rays @ n)
-        depths.append(np.where(z > 0, z, np.inf))
-    return np.asarray(np.min(depths, axis=0))
 
 
 def covisible(camera: Camera, z: Float64, T_camera_depth: Pose) -> npt.NDArray[np.bool_]:
