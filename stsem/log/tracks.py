@@ -16,6 +16,7 @@ from stsem.plain import plain
 Int64 = npt.NDArray[np.int64]
 Float64 = npt.NDArray[np.float64]
 MAX_NS = 1 << 63
+MAX_SCHEMA_BYTES = 1 << 20
 IMAGES = (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO)
 
 
@@ -70,7 +71,9 @@ class Track:
         topic, schema, encoding: of the channel; `encoding` is that of its messages.
         row: of the decoder table; None when stsem does not read such messages, which are then only counted.
         trouble: why a row could not be used; "" otherwise.
+        definition: the text of its schema.
         count, first_log_ns, last_log_ns, largest_gap_ns: of all messages.
+        out_of_order: messages whose log time is below that of the one before in the file.
         unstamped: messages without a capture stamp.
         transforms: (parent, child) -> samples.
         calibrations, class_names: those that differ from the one before.
@@ -80,7 +83,8 @@ class Track:
         self.topic, self.schema, self.encoding = plain(topic), plain(schema.name), plain(encoding)
         self.row: Row | None = TABLE.get((encoding, schema.name))
         self.trouble = f"{self.topic}: {plain(why)}" if (why := why_not(encoding, schema.name)) else ""
-        self.count = self.unstamped = self.largest_gap_ns = 0
+        self.definition = schema.data
+        self.count = self.unstamped = self.out_of_order = self.largest_gap_ns = 0
         self.first_log_ns: int | None = None
         self.last_log_ns: int | None = None
         self.transforms: dict[tuple[str, str], Samples] = {}
@@ -98,6 +102,8 @@ class Track:
 
     def _make_readers(self, row: Row, schema: Schema) -> None:
         try:
+            if len(schema.data) > MAX_SCHEMA_BYTES:
+                raise ValueError(f"it has {len(schema.data)} bytes, more than any message definition")
             self.decode = row.reader(schema)
             self._stamp = row.stamp(schema) if row.stamp else None
         except Exception as err:  # noqa: BLE001  a schema is foreign input to three parsers with errors of their own
@@ -132,6 +138,7 @@ class Track:
         self.count += 1
         if self._previous_log_ns is not None:
             self.largest_gap_ns = max(self.largest_gap_ns, log_ns - self._previous_log_ns)
+            self.out_of_order += log_ns < self._previous_log_ns
         self._previous_log_ns = log_ns
         self.first_log_ns = log_ns if self.first_log_ns is None else min(self.first_log_ns, log_ns)
         self.last_log_ns = log_ns if self.last_log_ns is None else max(self.last_log_ns, log_ns)
@@ -166,6 +173,11 @@ class Track:
         stamp, log, place, offset, length = (_as_int64(column) for column in (*self._times, *self._where))
         order = np.lexsort((offset, place, log, stamp))
         return References(stamp[order], log[order], place[order], offset[order], length[order])
+
+    @property
+    def duplicates(self) -> int:
+        """Messages that were read and have the stamp of an earlier one; several transforms may share one."""
+        return len(self._times[0]) - len(np.unique(_as_int64(self._times[0])))
 
     def stamp_offsets_ns(self) -> Int64:
         """(n,) log time minus stamp of every message that was read, in file order."""

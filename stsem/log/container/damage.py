@@ -3,22 +3,29 @@
 | kind | what happened | what is lost |
 |---|---|---|
 | `truncated` | the file ends early | everything behind that place |
-| `bad_record` | a record whose length or content cannot be | that record, or the rest of its chunk or file |
+| `bad_record` | a record whose length, kind or content cannot be | that record, or the rest of its chunk |
 | `chunk_crc` | a chunk does not have its checksum | the chunk |
 | `chunk_unreadable` | a chunk cannot be decompressed, or not to its stated size | the chunk |
-| `lost_message` | a message of a lost chunk, as the index behind the chunk states | the message |
+| `lost_message` | a message of a lost part, as the index behind a chunk or the statistics state | the message |
 | `unknown_channel` | a message whose channel is described nowhere | the message |
 | `undecodable` | a message that cannot be decoded | the message |
 | `data_crc`, `summary_crc`, `attachment_crc` | a section does not have its checksum | nothing |
-| `unread_byte` | bytes that were not understood | unknown |
+| `contradiction` | an index, the statistics, a chunk's times or a repeated definition say otherwise | unknown |
+| `unread_byte` | bytes that were not understood, or that stand behind the end of the recording | unknown |
+
+Behind a place that is no record, reading goes on at the next one that is (`unread_byte` counts the gap). Of the last
+chunk of a cut file nothing is used: its checksum cannot be checked. Two recordings in one file are not read as one:
+what stands behind the closing magic of the first is `unread_byte`; give them as two files. Where no checksum stands
+(`Scan.unprotected`), a wrong byte in a payload cannot be noticed.
 """
 
 import threading
 from collections import defaultdict
 
+MAX_REMEMBERED = 1 << 20
 KINDS = (
     "truncated", "bad_record", "chunk_crc", "chunk_unreadable", "lost_message", "unknown_channel", "undecodable",
-    "data_crc", "summary_crc", "attachment_crc", "unread_byte",
+    "data_crc", "summary_crc", "attachment_crc", "contradiction", "unread_byte",
 )  # fmt: skip
 
 
@@ -41,9 +48,12 @@ class Damage:
                 self._counts[kind][channel] += n
 
     def undecodable(self, channel: str, place: int, offset: int) -> None:
-        """Add the message at (`place`, `offset`) of `channel`, once."""
+        """Add the message at (`place`, `offset`) of `channel`, once; from the millionth on they are not told apart."""
         with self._lock:
-            self._undecodable.add((channel, place, offset))
+            if len(self._undecodable) < MAX_REMEMBERED:
+                self._undecodable.add((channel, place, offset))
+            else:
+                self._counts["undecodable"][channel] += (channel, place, offset) not in self._undecodable
 
     @property
     def counts(self) -> dict[str, dict[str, int]]:

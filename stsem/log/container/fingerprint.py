@@ -9,6 +9,7 @@ from typing import Self
 
 BATCH_BYTES = 1 << 18
 MAX_PENDING = 4
+MAX_PENDING_BYTES = 1 << 25
 
 
 class Fingerprint:
@@ -19,7 +20,8 @@ class Fingerprint:
         self._crc = 0
         self._batch = bytearray()
         self._worker = ThreadPoolExecutor(1, "stsem-sha256")
-        self._pending: deque[Future[None]] = deque()
+        self._pending: deque[tuple[int, Future[None]]] = deque()
+        self._pending_bytes = 0
         self.bytes_fed = 0
 
     def __enter__(self) -> Self:
@@ -65,14 +67,20 @@ class Fingerprint:
             self._batch.clear()
 
     def _submit(self, data: bytes) -> None:
-        self._pending.append(self._worker.submit(self._update, data))
-        if len(self._pending) > MAX_PENDING:
-            self._pending.popleft().result()
+        self._pending.append((len(data), self._worker.submit(self._update, data)))
+        self._pending_bytes += len(data)
+        while len(self._pending) > MAX_PENDING or self._pending_bytes > MAX_PENDING_BYTES:
+            self._wait_for_oldest()
 
     def _settle(self) -> None:
         self._flush()
         while self._pending:
-            self._pending.popleft().result()
+            self._wait_for_oldest()
+
+    def _wait_for_oldest(self) -> None:
+        size, done = self._pending.popleft()
+        done.result()
+        self._pending_bytes -= size
 
     def _update(self, data: bytes) -> None:
         self._sha.update(data)

@@ -1,27 +1,29 @@
 """The container: records of an MCAP file from front to back, in one pass, believing nothing but what it reads.
 
 Neither the summary nor an index is used to find anything. Every checksum that is there is checked: of chunks, of
-attachments, of the data section and of the summary. Specification: https://mcap.dev/spec.
+attachments, of the data section and of the summary. A record is followed only if another one can stand behind it;
+otherwise reading goes on at the next place that is one. What stands behind the closing magic is not read: a second
+recording there has to be given as a file of its own. Specification: https://mcap.dev/spec.
 """
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import BinaryIO
 
 from mcap.opcode import Opcode
 
 from stsem.errors import LogError
 from stsem.log.container.damage import Damage
 from stsem.log.container.fingerprint import Fingerprint
+from stsem.log.container.layout import FRAME, LAYOUT, is_head, is_whole
+from stsem.log.container.resync import Resync, own_length
 from stsem.log.container.source import Source
 
 MAGIC = b"\x89MCAP0\r\n"
-FRAME = struct.Struct("<BQ")
-MESSAGE_HEAD = struct.Struct("<HIQQ")
-MAX_RECORD_BYTES = 1 << 31
+GAP = 0
+"""Opcode of no record; here it stands for a stretch of bytes that is none."""
+MAX_RECORD_BYTES = 1 << 28
 MAX_ATTACHMENT_BYTES = 1 << 26
-FOOTER_BYTES = 20
+MAX_READ_TWICE = 1 << 26
 BLOCK = 1 << 20
 
 KNOWN_HEADS = {
@@ -35,101 +37,169 @@ class Record:
     """One record at the top level of a file.
 
     Args:
-        opcode: as in the specification; unknown ones are passed on.
-        body: without opcode and length.
+        opcode: as in the specification, private ones too, or GAP.
+        body: without opcode and length; b"" when it is too large to be of use.
+        length: of the body in the file.
         place: bytes from the front of the file to its opcode.
         in_summary: whether it stands behind the end of the data section.
     """
 
     opcode: int
     body: bytes
+    length: int
     place: int
     in_summary: bool
 
 
-def read_records(source: Source, damage: Damage, fingerprint: Fingerprint) -> Iterator[Record]:
-    """All whole records of `source`, in file order, up to the end or to the place where it can no longer be followed.
+class RecordWalk:
+    """All records of one file, in file order; every byte of the file goes through `fingerprint`.
 
-    Every byte of the file goes through `fingerprint`, also behind such a place.
+    Attributes:
+        data_has_crc: whether the data section had a checksum, right or wrong; known behind it.
+        summary_is_right: whether the summary had a checksum and it was right; known at the end.
 
     Raises:
-        LogError: the file is missing, empty or not MCAP.
+        LogError: on iterating: the file is missing, empty or not MCAP.
     """
-    with source.open() as file:
-        size = source.size
-        _check_magic(source, file.read(len(MAGIC)), size)
-        fingerprint.restart(MAGIC)
-        yield from _walk(file, size, damage, fingerprint)
-        while block := file.read(BLOCK):
-            fingerprint.feed(block)
 
+    def __init__(self, source: Source, damage: Damage, fingerprint: Fingerprint) -> None:
+        self._source, self._damage, self._fingerprint = source, damage, fingerprint
+        self._size = source.size
+        self._place = len(MAGIC)
+        self._in_summary = self._behind_footer = self._ended = False
+        self._in_chunks: bool | None = None
+        self._dropped_bytes = 0
+        self.data_has_crc = self.summary_is_right = False
 
-def _walk(file: BinaryIO, size: int, damage: Damage, fingerprint: Fingerprint) -> Iterator[Record]:
-    place, in_summary = len(MAGIC), False
-    while True:
-        head = file.read(FRAME.size)
-        opcode, length = FRAME.unpack(head) if len(head) == FRAME.size else (0, size)
-        if length > size - place - FRAME.size:
-            fingerprint.feed(head)
-            _lost_track(file, size, place, damage)
-            return
+    def __iter__(self) -> Iterator[Record]:
+        with self._source.open() as file:
+            _check_magic(self._source, file.read(len(MAGIC)), self._size)
+            self._fingerprint.restart(MAGIC)
+            self._file, self._resync = file, Resync(file, self._size)
+            self._head = file.read(FRAME.size)
+            while len(self._head) == FRAME.size and not self._ended:
+                if (record := self._step()) is not None:
+                    yield record
+            if not self._ended:
+                self._close()
+            self._feed(self._place, self._size)
+
+    def _step(self) -> Record | None:
+        """The record at this place; None when there is none that can be used."""
+        place, (opcode, length) = self._place, FRAME.unpack(self._head)
+        end = place + FRAME.size + length
+        if not is_head(opcode, length, self._size - place - FRAME.size):
+            return self._go_on(opcode, self._search(opcode, place + 1))
+        if length > (MAX_RECORD_BYTES if opcode in (Opcode.CHUNK, Opcode.MESSAGE) else MAX_ATTACHMENT_BYTES):
+            return self._pass_by(opcode, length)
+        body, following = self._file.read(length), self._file.read(FRAME.size)
+        if len(body) < length:
+            raise LogError(f"{self._source} changed while it was being read; run again on a file at rest.")
+        if opcode == Opcode.FOOTER and following.startswith(MAGIC):
+            self._ended = True
+            self._damage.count("unread_byte", n=self._size - end - len(MAGIC))
+        elif not self._can_follow(end, following):
+            own = own_length(opcode, body)
+            found = self._search(opcode, place + 1 if own is None else place + FRAME.size + own)
+            broken = own is None and opcode in LAYOUT and opcode != Opcode.MESSAGE
+            if found is not None and (found < end or broken):
+                self._dropped_bytes += length
+                return self._go_on(opcode, found)
+            self._file.seek(end + len(following))
+        head, self._place, self._head = self._head, end, following
+        return self._accept(opcode, head, body, place)
+
+    def _can_follow(self, end: int, following: bytes) -> bool:
+        """Whether a record may stand at `end`, or the file ends there; also when too much was read twice already."""
+        if len(following) < FRAME.size or self._dropped_bytes > self._size + MAX_READ_TWICE:
+            return True
+        opcode, length = FRAME.unpack(following)
+        return is_head(opcode, length, self._size - end - FRAME.size)
+
+    def _search(self, opcode: int, start: int) -> int | None:
+        in_chunks = opcode == Opcode.CHUNK if self._in_chunks is None else self._in_chunks
+        return self._resync.next_record(start, chunked=in_chunks and not self._in_summary)
+
+    def _go_on(self, opcode: int, found: int | None) -> Record | None:
+        """The record here has a wrong length, or is none; `found` is where the next one is."""
+        place, head, behind = self._place, self._head, self._place + FRAME.size
+        if found is None:
+            self._lose_rest()
+            return None
+        self._damage.count("bad_record")
+        self._file.seek(behind)
+        body = self._file.read(found - behind) if 0 <= found - behind <= MAX_RECORD_BYTES else b""
+        self._file.seek(found)
+        self._place, self._head = found, self._file.read(FRAME.size)
+        if opcode in LAYOUT and found >= behind and is_whole(opcode, body):
+            return self._accept(opcode, head, body, place)
+        self._damage.count("unread_byte", n=found - place)
+        self._feed(place, found)
+        return Record(GAP, b"", found - place, place, self._in_summary)
+
+    def _lose_rest(self) -> None:
+        """Nothing behind this place can be read: either the file is cut, or it is broken up to its end."""
+        self._file.seek(max(0, self._size - len(MAGIC)))
+        complete = self._size - len(MAGIC) >= self._place and self._file.read(len(MAGIC)) == MAGIC
+        self._damage.count("bad_record" if complete else "truncated")
+        if complete:
+            self._damage.count("unread_byte", n=self._size - self._place)
+        self._ended = True
+
+    def _close(self) -> None:
+        """The file ends without a footer and its magic."""
+        whole = self._head == MAGIC or (self._behind_footer and len(self._head) == len(MAGIC))
+        self._damage.count("bad_record" if whole else "truncated")
+
+    def _pass_by(self, opcode: int, length: int) -> Record | None:
+        """A record too large to be read at once."""
+        place, end = self._place, self._place + FRAME.size + length
+        self._file.seek(end)
+        following = self._file.read(FRAME.size)
+        if not self._can_follow(end, following):
+            return self._go_on(opcode, self._search(opcode, place + 1))
+        self._feed(place, end)
+        self._file.seek(end + len(following))
+        self._place, self._head = end, following
+        return Record(opcode, b"", length, place, self._in_summary)
+
+    def _feed(self, start: int, end: int) -> None:
+        """The bytes from `start` to `end`, which are no record that was read, to the fingerprint."""
+        self._file.seek(start)
+        for at in range(start, end, BLOCK):
+            self._fingerprint.feed(self._file.read(min(BLOCK, end - at)))
+        self._file.seek(self._place + len(self._head))
+
+    def _accept(self, opcode: int, head: bytes, body: bytes, place: int) -> Record:
+        """A record, with the checksum of the section that it ends."""
+        record, crc = Record(opcode, body, len(body), place, self._in_summary), body[-4:]
+        if self._in_chunks is None and opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+            self._in_chunks = opcode == Opcode.CHUNK
+        self._behind_footer = opcode == Opcode.FOOTER
         if opcode == Opcode.DATA_END:
-            body = _data_end(file, head, length, damage, fingerprint)
+            self.data_has_crc = self._check("data_crc", crc) is not None
+            self._in_summary = True
+            self._fingerprint.feed(head + body)
+            self._fingerprint.restart_section()
         elif opcode == Opcode.FOOTER:
-            body = _footer(file, head, length, damage, fingerprint)
+            self._fingerprint.feed(head + body[:-4])
+            self.summary_is_right = bool(self._check("summary_crc", crc))
+            self._fingerprint.feed(crc)
+            if len(self._head) == FRAME.size and not self._ended:
+                self._damage.count("bad_record")
         else:
-            body = _body(file, head, opcode, length, fingerprint)
-        yield Record(opcode, body, place, in_summary)
-        in_summary = in_summary or opcode == Opcode.DATA_END
-        place += FRAME.size + length
-        if opcode == Opcode.FOOTER:
-            return
+            self._fingerprint.feed(head)
+            self._fingerprint.feed(body)
+        return record
 
-
-def _body(file: BinaryIO, head: bytes, opcode: int, length: int, fingerprint: Fingerprint) -> bytes:
-    """The body of a record; of one too large to be of use, only the front."""
-    kept = MAX_RECORD_BYTES if opcode in (Opcode.CHUNK, Opcode.MESSAGE) else MAX_ATTACHMENT_BYTES
-    body = file.read(min(length, kept))
-    fingerprint.feed(head)
-    fingerprint.feed(body)
-    for done in range(len(body), length, BLOCK):
-        fingerprint.feed(file.read(min(BLOCK, length - done)))
-    return body
-
-
-def _data_end(file: BinaryIO, head: bytes, length: int, damage: Damage, fingerprint: Fingerprint) -> bytes:
-    """DataEnd: the checksum is over everything before this record, from the magic on."""
-    found = fingerprint.crc()
-    body = _body(file, head, Opcode.DATA_END, length, fingerprint)
-    stated = int.from_bytes(body[:4], "little")
-    if stated not in (0, found):
-        damage.count("data_crc")
-    fingerprint.restart_section()
-    return body
-
-
-def _footer(file: BinaryIO, head: bytes, length: int, damage: Damage, fingerprint: Fingerprint) -> bytes:
-    """Footer: the checksum is over the summary and this record up to the checksum itself; the magic closes the file."""
-    body, end = file.read(length), file.read(len(MAGIC))
-    fingerprint.feed(head + body[:-4])
-    stated = int.from_bytes(body[-4:], "little")
-    if stated not in (0, fingerprint.crc()):
-        damage.count("summary_crc")
-    fingerprint.feed(body[-4:] + end)
-    if length != FOOTER_BYTES or end != MAGIC:
-        damage.count("truncated" if len(end) < len(MAGIC) else "bad_record")
-    return body
-
-
-def _lost_track(file: BinaryIO, size: int, place: int, damage: Damage) -> None:
-    """A record would reach behind the end of the file: either the file is cut, or its length is wrong."""
-    here = file.tell()
-    file.seek(size - len(MAGIC))
-    complete = size - len(MAGIC) >= place and file.read(len(MAGIC)) == MAGIC
-    file.seek(here)
-    damage.count("bad_record" if complete else "truncated")
-    if complete:
-        damage.count("unread_byte", n=size - place)
+    def _check(self, kind: str, crc: bytes) -> bool | None:
+        """Whether the section up to here has the checksum; None when none is stated."""
+        stated = int.from_bytes(crc, "little")
+        if stated == 0:
+            return None
+        right = stated == self._fingerprint.crc()
+        self._damage.count(kind, n=0 if right else 1)
+        return right
 
 
 def _check_magic(source: Source, head: bytes, size: int) -> None:
