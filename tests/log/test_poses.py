@@ -2,40 +2,15 @@
 
 import numpy as np
 import pytest
-from made_up_logs import LEVEL, ROS
-from mcap.records import Schema
+from made_up_logs import LEVEL
+from made_up_tracks import MS, pose, track, turn
 
-from stsem.log.container.damage import Damage
 from stsem.log.poses.chains import transform_chain
 from stsem.log.poses.source import MAX_GAP_NS, PoseSource
 from stsem.log.poses.topics import topic_poses
 from stsem.log.poses.tree import FrameTree
-from stsem.log.schemas.messages import Transform
-from stsem.log.tracks import Samples, Track
-from stsem.pose import Pose, from_quaternion, interpolate
-
-MS = 1_000_000
-Q = tuple[float, float, float, float]
-
-
-def turn(degrees: float) -> Q:
-    """About z."""
-    half = np.deg2rad(degrees) / 2
-    return (0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
-
-
-def track(topic: str, *samples: tuple[int | None, int, str, str, tuple[float, float, float], Q]) -> Track:
-    name = "tf2_msgs/msg/TFMessage"
-    made = Track(topic, Schema(id=1, name=name, encoding="ros2msg", data=ROS.schema(name)), "cdr", Damage())
-    for stamp, log, parent, child, t, q in samples:
-        made.transforms.setdefault((parent, child), Samples()).add(Transform(stamp, parent, child, t, q), log)
-    made.count = len(samples)
-    return made
-
-
-def pose(t: tuple[float, float, float], q: Q = LEVEL) -> Pose:
-    return from_quaternion(t, q)
-
+from stsem.log.tracks import Track
+from stsem.pose import interpolate
 
 STATIC = track(
     "/tf_static",

@@ -39,10 +39,9 @@ def find_poses(
         source, warnings = chain_to(tree, camera_frame.lstrip("/"))
     if source is None:
         track, said = (asked, "") if asked else choose_pose(tracks)
-        warnings += [said] if said else []
         if track is not None and track.kind is Kind.POSE and track.transforms:
             source, more = topic_poses(track, tree, camera_frame)
-            warnings += more
+            warnings = ([] if source else warnings) + ([said] if said else []) + more
     if source is None:
         return None, warnings
     edges, jumps = mark_jumps(source.edges)
