@@ -20,6 +20,7 @@ MAGIC = b"#ROSBAG V2.0\n"
 MAX_HEADER_BYTES = 16 << 20
 MAX_DATA_BYTES = 1 << 30
 DAMAGED = "places in the bag that are damaged or cut off"
+UNINDEXED = "indexes that are missing or damaged, so that nobody knows whether the end of the bag is there"
 MISSING = "messages that the bag's index names and that cannot be read"
 
 _MESSAGE, _BAG, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = (bytes([op]) for op in range(2, 8))
@@ -71,6 +72,7 @@ class _Index:
     connections: dict[int, Connection] = field(default_factory=dict)
     chunks: list[int] = field(default_factory=list)
     messages: int = 0
+    whole: bool = False
 
 
 def messages(path: Path) -> Iterator[tuple[int, Message | Loss]]:
@@ -105,6 +107,8 @@ def _messages(path: Path, stream: BinaryIO, size: int) -> Iterator[tuple[int, Me
         at = end
     if at > size:
         yield size, Loss(DAMAGED)
+    if not index.whole:
+        yield size, Loss(UNINDEXED)
     if read < index.messages:
         yield size, Loss(MISSING, count=index.messages - read)
 
@@ -128,7 +132,9 @@ def _index(stream: BinaryIO, size: int) -> _Index:
     """Connections, chunks and counts at the end of the file; as far as they can be read."""
     index = _Index()
     try:
-        at = int.from_bytes(_record(stream, len(MAGIC), size).header[b"index_pos"], "little")
+        header = _record(stream, len(MAGIC), size).header
+        at = int.from_bytes(header[b"index_pos"], "little")
+        indexed = at > len(MAGIC)
         while len(MAGIC) < at < size:
             record = _record(stream, at, size)
             at = record.data_at + record.length
@@ -138,6 +144,7 @@ def _index(stream: BinaryIO, size: int) -> _Index:
                 data = _data(stream, record)
                 index.chunks.append(int.from_bytes(record.header[b"chunk_pos"], "little"))
                 index.messages += sum(_u32(data, i + 4) for i in range(0, len(data) - 7, 8))
+        index.whole = indexed and at == size and len(index.chunks) == _u32(header[b"chunk_count"], 0)
     except (ValueError, KeyError):
         pass
     index.chunks.sort()
