@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.records import Schema
 
+from stsem.log.schemas import definition
 from stsem.log.schemas.definition import MAX_BYTES, check_layout, layout
 from stsem.log.schemas.ros import TYPES
 
@@ -83,6 +84,22 @@ def chain(width: int, depth: int) -> str:
 def test_a_definition_made_to_cost_is_refused(text: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         check_layout(ros1(text), COMPRESSED)
+
+
+def test_a_schema_that_many_channels_share_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also one that is refused: the number of channels times its size would be hours."""
+    asked: list[str] = []
+
+    def counted(text: str) -> str:
+        asked.append(text)
+        return layout(text)
+
+    monkeypatch.setattr(definition, "layout", counted)
+    for text in (OWN + "int8 once\n" + RULE + HEADER, "Once x\n"):
+        for _ in range(3):
+            with pytest.raises(ValueError, match=r"its layout is|is not defined"):
+                check_layout(ros1(text), COMPRESSED)
+        assert asked.count(text) == 1
 
 
 def test_bytes_that_are_no_text_are_refused() -> None:

@@ -193,6 +193,16 @@ def test_a_schema_that_is_no_set_of_descriptors_is_refused(data: bytes, reason: 
         protobuf.Messages(schema)
 
 
+def test_a_type_of_thousands_of_fields_is_refused() -> None:
+    def grow(files: FileDescriptorSet) -> None:
+        (message,) = (m for file in files.file for m in file.message_type if m.name == "CompressedImage")
+        for number in range(1000, 3000):
+            message.field.add(name=f"f{number}", number=number, type="TYPE_STRING", label="LABEL_OPTIONAL")
+
+    with pytest.raises(ValueError, match=r"foxglove.CompressedImage is described with 2004 fields"):
+        read("protobuf", "foxglove.CompressedImage", b"", described(grow))
+
+
 def test_a_schema_without_the_types_below_is_refused_when_they_are_met() -> None:
     def forget(files: FileDescriptorSet) -> None:
         kept = [file for file in files.file if file.package == "foxglove"]

@@ -5,6 +5,7 @@ out in another way; nothing is ever generated from it.
 """
 
 import re
+from functools import lru_cache
 
 from mcap.records import Schema
 
@@ -39,9 +40,21 @@ def check_layout(schema: Schema, expected: str) -> None:
         return
     if schema.encoding not in HEADER:
         raise ValueError(f"a schema in {schema.encoding!r} cannot be read, only {' or '.join(HEADER)}")
-    found, wanted = layout(schema.data.decode()), expected.format(header=HEADER[schema.encoding])
+    found, reason = _layout_or_reason(schema.data)
+    if reason:
+        raise ValueError(reason)
+    wanted = expected.format(header=HEADER[schema.encoding])
     if found != wanted:
         raise ValueError(f"its layout is '{found[:200] or 'empty'}', but '{wanted}' was expected")
+
+
+@lru_cache(maxsize=16)
+def _layout_or_reason(data: bytes) -> tuple[str, str]:
+    """(layout, why there is none); thousands of channels may share a schema."""
+    try:
+        return layout(data.decode()), ""
+    except ValueError as err:
+        return "", str(err)
 
 
 def layout(text: str) -> str:

@@ -17,6 +17,11 @@ class Kind(Enum):
     POSE = auto()
     CLASS_TABLE = auto()
 
+    @property
+    def is_image(self) -> bool:
+        """Whether such messages hold pixels, in whatever form."""
+        return self in (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO)
+
 
 @dataclass(frozen=True, eq=False)
 class RawImage:

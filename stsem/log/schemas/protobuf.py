@@ -6,6 +6,7 @@ bytes are not such a message.
 
 import struct
 from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from google.protobuf import descriptor_pb2, message  # type: ignore[import-untyped]
@@ -19,6 +20,7 @@ from stsem.log.schemas.messages import Decoded
 MAX_SCHEMA_BYTES = 1 << 20
 MAX_DEPTH = 20
 MAX_FIELDS = 100_000
+MAX_FIELDS_DESCRIBED = 200
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
 Proto = descriptor_pb2.FieldDescriptorProto
 WireValue = int | memoryview
@@ -89,18 +91,26 @@ def message_types(schema: Schema) -> Types:
         raise ValueError(f"a schema in {schema.encoding!r} cannot be read, only 'protobuf'")
     if len(schema.data) > MAX_SCHEMA_BYTES:
         raise ValueError(f"it has {len(schema.data)} bytes, more than any message definition")
+    types = _described(schema.data)
+    if types is None:
+        raise ValueError("it is no set of protobuf descriptors")
+    if f".{schema.name}" not in types:
+        raise ValueError(f"it does not describe {schema.name}")
+    return types
+
+
+@lru_cache(maxsize=16)
+def _described(data: bytes) -> Types | None:
+    """The types in a schema, None when it is none; thousands of channels may share a schema."""
     try:
-        files = descriptor_pb2.FileDescriptorSet.FromString(schema.data).file
-    except message.DecodeError as err:
-        raise ValueError("it is no set of protobuf descriptors") from err
-    types = {
+        files = descriptor_pb2.FileDescriptorSet.FromString(data).file
+    except message.DecodeError:
+        return None
+    return {
         f".{file.package}.{one.name}" if file.package else f".{one.name}": one
         for file in files
         for one in file.message_type
     }
-    if f".{schema.name}" not in types:
-        raise ValueError(f"it does not describe {schema.name}")
-    return types
 
 
 class _Field(NamedTuple):
@@ -139,6 +149,8 @@ class Messages:
         if type_name not in self._fields:
             if type_name not in self._types:
                 raise ValueError(f"{type_name[1:80]} is not described by the schema")
+            if len(self._types[type_name].field) > MAX_FIELDS_DESCRIBED:
+                raise ValueError(f"{type_name[1:80]} is described with {len(self._types[type_name].field)} fields")
             self._fields[type_name] = {
                 field.number: _Field(field.name, field.type, field.type_name, field.label == Proto.LABEL_REPEATED)
                 for field in self._types[type_name].field

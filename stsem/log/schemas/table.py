@@ -14,7 +14,6 @@ from stsem.log.schemas.messages import Decoded, Kind
 
 StampReader = Callable[[memoryview], int | None]
 MessageReader = Callable[[memoryview], Decoded]
-IMAGES = (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO)
 Rows = Iterator[tuple[tuple[str, str], "Row"]]
 
 
@@ -55,17 +54,19 @@ FOXGLOVE: dict[str, tuple[Kind, Callable[[Fields], Decoded]]] = {
 def _ros_rows() -> Rows:
     for encoding, begin in ROS_FAMILIES.items():
         for name, message in ros.TYPES.items():
-            stamp = ros.stamp_reader(message, begin) if message.kind in (*IMAGES, Kind.CALIBRATION) else None
-            row = Row(message.kind, ros.reader(message, begin), stamp, ros.STAMP_BYTES if stamp else 0)
+            stamp, stamp_bytes = None, 0
+            if message.kind.is_image or message.kind is Kind.CALIBRATION:
+                stamp, stamp_bytes = ros.stamp_reader(message, begin), ros.STAMP_BYTES
+            row = Row(message.kind, ros.reader(message, begin), stamp, stamp_bytes)
             for spelling in ROS_SPELLINGS:
                 yield (encoding, spelling.format(*name.split("/"))), row
 
 
 def _foxglove_rows() -> Rows:
     for name, (kind, convert) in FOXGLOVE.items():
-        is_image = kind in IMAGES
-        yield ("protobuf", name), Row(kind, protobuf.reader(convert), protobuf.stamp_reader if is_image else None)
-        yield ("json", name), Row(kind, foxglove_json.reader(convert), foxglove_json.stamp_reader if is_image else None)
+        for encoding, family in (("protobuf", protobuf), ("json", foxglove_json)):
+            stamp = family.stamp_reader if kind.is_image else None
+            yield (encoding, name), Row(kind, family.reader(convert), stamp)
 
 
 TABLE: dict[tuple[str, str], Row] = {**dict(_ros_rows()), **dict(_foxglove_rows())}
