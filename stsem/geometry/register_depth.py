@@ -37,12 +37,12 @@ class DepthRegistration:
         if depth_camera.is_distorted or color_camera.is_distorted:
             raise ValueError("depth is registered between cameras without distortion; undo it first")
         self._size, self._color = (depth_camera.height, depth_camera.width), color_camera
-        x = (np.arange(depth_camera.width) - depth_camera.cx) / depth_camera.fx
-        y = (np.arange(depth_camera.height) - depth_camera.cy) / depth_camera.fy
-        rays = np.stack([*np.broadcast_arrays(x[None, :], y[:, None]), np.ones(self._size)]).reshape(3, -1)
+        x = ((np.arange(depth_camera.width) - depth_camera.cx) / depth_camera.fx)[None, :]
+        y = ((np.arange(depth_camera.height) - depth_camera.cy) / depth_camera.fy)[:, None]
         K = color_camera.K
         # Homogeneous colour pixel of the point at depth z: K (R ray z + t).
-        self._rays: Float32 = (K @ T_color_depth[:3, :3] @ rays).astype(np.float32)
+        rows = K @ T_color_depth[:3, :3]
+        self._rays = [(a * x + b * y + c).astype(np.float32).reshape(-1) for a, b, c in rows]
         self._origin: Float32 = (K @ T_color_depth[:3, 3]).astype(np.float32)
         self._scales = np.abs([color_camera.fx / depth_camera.fx, color_camera.fy / depth_camera.fy]).astype(np.float32)
         growth = max(color_camera.width / depth_camera.width, color_camera.height / depth_camera.height)

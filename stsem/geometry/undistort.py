@@ -117,9 +117,9 @@ def _maps(camera: Camera) -> Maps:
     if not 0 < max(camera.width, camera.height) <= MAX_SIDE:
         raise ValueError(f"an image of {camera.width}x{camera.height} pixels cannot be resampled")
     with np.errstate(all="ignore"):
-        reach = _reach(camera, lens, d)
+        radii = _radii(camera)
         x, y = lens.maps(camera.K, d, (camera.width, camera.height))
-        told = np.isfinite(x) & np.isfinite(y) & (_radii(camera) <= reach)
+        told = np.isfinite(x) & np.isfinite(y) & (radii <= _reach(float(radii.max()), lens, d))
     seen = told & (x >= 0) & (x <= camera.width - 1) & (y >= 0) & (y <= camera.height - 1)
     if (share := float(seen.mean())) < MIN_SHARE:
         raise ValueError(f"the coefficients of {camera.model} are no lens: it would fill {share:.0%} of the image")
@@ -130,15 +130,15 @@ def _maps(camera: Camera) -> Maps:
     return x, y
 
 
-def _reach(camera: Camera, lens: Lens, d: Float64) -> float:
-    """Distance from the axis / f up to which the model grows; beyond, it folds the image back onto itself."""
-    radii = np.linspace(0, float(_radii(camera).max()), RADII)
+def _reach(end: float, lens: Lens, d: Float64) -> float:
+    """Distance from the axis / f up to which the model grows on its way to `end`; beyond, it folds the image back."""
+    radii = np.linspace(0, end, RADII)
     growing = np.diff(lens.radius(radii, d)) > 0
     return float("inf") if growing.all() else float(radii[int(growing.argmin())])
 
 
-def _radii(camera: Camera) -> Float64:
+def _radii(camera: Camera) -> Float32:
     """(H, W) distance of each pixel from the axis, divided by f."""
-    x = (np.arange(camera.width) - camera.cx) / camera.fx
-    y = (np.arange(camera.height) - camera.cy) / camera.fy
-    return np.asarray(np.hypot(x[None, :], y[:, None]), np.float64)
+    x = ((np.arange(camera.width) - camera.cx) / camera.fx).astype(np.float32)
+    y = ((np.arange(camera.height) - camera.cy) / camera.fy).astype(np.float32)
+    return np.asarray(np.hypot(x[None, :], y[:, None]), np.float32)
