@@ -20,11 +20,12 @@ class Frame:
     Args:
         index: log index: position among the colour frames of the log, by stamp.
         stamp_ns: capture stamp, as in the log.
-        image: (H, W, 3) uint8 RGB, lens distortion undone.
+        image: (H, W, 3) uint8 RGB, lens distortion undone; as recorded where the log does not state it, or where the
+            lens is not understood (then `camera` is None).
         previous: (H, W, 3) uint8 RGB, the previous decodable colour frame of the log, taken or not; None for the first.
         depth: (H, W) float32 metres along z in the colour camera, NaN unknown; None without a depth partner.
         T_WC: (4, 4) float64, world from camera, metres, optical axes; None without a pose.
-        camera: intrinsics of `image`; None when the log has none.
+        camera: intrinsics of `image`, without distortion; None when the log has none.
     """
 
     index: int
