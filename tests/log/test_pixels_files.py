@@ -19,6 +19,7 @@ from stsem.log.schemas.messages import CompressedImage
 
 JPEG, PNG, WEBP = encoded(".jpg", picture(2)), encoded(".png", picture(2)), encoded(".webp", picture(2))
 LOSSY_WEBP = encoded(".webp", picture(2), cv2.IMWRITE_WEBP_QUALITY, 60)
+WIDE = encoded(".jpg", np.zeros((8, 80), np.uint8))
 HEIGHT, WIDTH = picture(2).shape[:2]
 
 
@@ -87,6 +88,13 @@ def test_the_orientation_tag_is_ignored() -> None:
         np.testing.assert_array_equal(decode.colour(compressed(data)), expected)
 
 
+def test_what_stands_before_the_frame_header_is_skipped() -> None:
+    """A preview with a frame header of its own, fill bytes, and bytes that are no marker."""
+    preview = b"\xff\xe1" + (len(WIDE) + 2).to_bytes(2, "big") + WIDE
+    data = JPEG[:2] + preview + b"\xff\xff\xff\xfe\0\4hi" + b"\0\1" + b"\xff\xd0" + JPEG[2:]
+    np.testing.assert_array_equal(decode.colour(compressed(data)), decode.colour(compressed(JPEG)))
+
+
 def test_a_progressive_jpeg_and_a_grey_one() -> None:
     data = encoded(".jpg", picture(1), cv2.IMWRITE_JPEG_PROGRESSIVE, 1)
     assert np.abs(decode.colour(compressed(data)).astype(int) - picture(1)).mean() < 20
@@ -116,6 +124,7 @@ FTYP = b"\0\0\0\x20ftyp"
         (JPEG[:200], "jpeg", "the jpeg"),
         (JPEG[:-2], "jpeg", "the jpeg ends early"),
         (b"\xff\xd8\xff\xd9", "jpeg", "the jpeg does not say its size"),
+        (b"\xff\xd8" + b"\xff\xe0\0\2" * 5000 + JPEG[2:], "jpeg", "the jpeg does not say its size"),
         (PNG[:40], "png", "the png ends early"),
         (PNG[:20], "png", "the png ends early"),
         (PNG[:-5], "png", "the png ends early"),

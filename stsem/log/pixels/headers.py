@@ -7,9 +7,13 @@ from itertools import islice
 MAX_SCANS = 100
 """A progressive jpeg has about ten; each one more makes the decoder pass the whole image again."""
 
+MAX_SEGMENTS = 1 << 12
+"""Before the frame header: profiles and previews in pieces of 64 KiB are some dozens."""
+
+_MARKER = re.compile(rb"\xff[\x02-\xcf\xd8-\xfe]")  # but those without a length: TEM and RST0..RST7
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0..SOF15; DHT, JPG and DAC lie between them
+_PICTURE = frozenset({0xD8, 0xD9, 0xDA})  # SOI, EOI, SOS
 _SCAN = re.compile(rb"\xff\xda")
-_BARE = frozenset({0x01, *range(0xD0, 0xD9)})  # markers without a length
 
 
 @dataclass(frozen=True)
@@ -28,19 +32,17 @@ def jpeg_head(data: memoryview) -> Head:
         ValueError: there is none.
     """
     at = 2
-    while at + 4 <= len(data):
-        if data[at] != 0xFF or data[at + 1] in (0x00, 0xFF):  # between segments decoders skip what is no marker
-            at += 1
-            continue
-        marker = data[at + 1]
-        if marker in _FRAMES:
-            if at + 10 > len(data):
-                break
-            height, width = (int.from_bytes(data[k : k + 2], "big") for k in (at + 5, at + 7))
-            return Head(width, height, data[at + 9])
-        if marker in (0xD9, 0xDA):
+    for _ in range(MAX_SEGMENTS):
+        found = _MARKER.search(data, at)  # between segments decoders skip what is no marker
+        if found is None or found.end() + 8 > len(data):
             break
-        at += 2 if marker in _BARE else 2 + max(2, int.from_bytes(data[at + 2 : at + 4], "big"))
+        at, marker = found.end(), data[found.end() - 1]
+        if marker in _FRAMES:
+            height, width = (int.from_bytes(data[k : k + 2], "big") for k in (at + 3, at + 5))
+            return Head(width, height, data[at + 7])
+        if marker in _PICTURE:
+            break
+        at += max(2, int.from_bytes(data[at : at + 2], "big"))
     raise ValueError("the jpeg does not say its size")
 
 

@@ -9,8 +9,8 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 GREY, RGB, PALETTE, GREY_ALPHA, RGB_ALPHA = 0, 2, 3, 4, 6
 CHANNELS = {GREY: 1, RGB: 3, PALETTE: 1, GREY_ALPHA: 2, RGB_ALPHA: 4}
 MAX_CHUNKS = 1 << 16
-INFLATED_FIRST = 1 << 20
-"""Streams up to here are left to the decoder: at deflate's best ratio of 1032 that is a second or two."""
+INFLATED_FIRST = 1 << 19
+"""Streams up to here are left to the decoder: at deflate's best ratio of 1032 they cost it a second or two."""
 
 
 @dataclass(frozen=True)
