@@ -16,6 +16,8 @@ from stsem.log.tracks import Int64
 from stsem.pose import Pose, Trajectory
 
 MAX_GAP_NS = 150_000_000
+BLOCK = 1 << 16
+"""Stamps looked up at once: interpolation needs a kilobyte for each."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,11 @@ class PoseSource:
 
     def poses(self, stamps_ns: Int64) -> Pose:
         """(n, 4, 4) T_WC at `stamps_ns` (n,), all of which must be known."""
-        return compose(self.edges, stamps_ns)
+        result = np.empty((len(stamps_ns), 4, 4))
+        for start in range(0, len(stamps_ns), BLOCK):
+            block = slice(start, start + BLOCK)
+            result[block] = compose(self.edges, stamps_ns[block])
+        return result
 
     def stamps_ns(self) -> Int64:
         """Ascending union of the stamps of the moving edges."""
