@@ -1,7 +1,7 @@
 """How depth comes to lie on the pixels of colour: as it is, resized, or projected through the log's extrinsic."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -96,6 +96,8 @@ def depth_reader(
         return DepthReader(depth.size, _as_colour(depth, color, registered)), []
     if registered == "yes":
         return None, [f"{depth} cannot have the pixels of {color}, being of another shape: depth is not used."]
+    if registered == "no" and depth.optics.track is color.optics.track:
+        depth = replace(depth, optics=Optics())  # one calibration for both would be the assumption that "no" forbids
     T, missing = _extrinsic(depth, color, extrinsic)
     if T is not None and depth.optics.camera and color.optics.camera:
         return _through(depth, color, T)

@@ -217,6 +217,19 @@ def test_the_same_camera_under_two_names_costs_nothing(recorder: Callable[..., R
         np.testing.assert_array_equal(depth_of(opened), metres)
 
 
+def test_no_does_not_trust_one_calibration_for_both(recorder: Callable[..., Recorder]) -> None:
+    """A driver that stamps depth with colour's frame: the user who says no is believed."""
+    log = recorder()
+    color(log, DEPTH)
+    depth(log, METRES, None, frame_id="color_optical")
+    path = log.close()
+    with open_log([path]) as opened:
+        np.testing.assert_array_equal(depth_of(opened), METRES)
+    with open_log([path], depth_registered="no") as opened:
+        assert depth_of(opened) is None
+        assert "lacks a usable calibration of /cam/depth/image_rect_raw: depth is not used" in opened.info.warnings[0]
+
+
 def test_an_optical_frame_taken_for_a_body_frame_would_show(recorder: Callable[..., Recorder]) -> None:
     """The extrinsic is between the frames that the headers name, not their parents: a body frame turned by 90 degrees
     sees nothing of it."""
