@@ -30,7 +30,7 @@ class Outcome(StrEnum):
         return self in (Outcome.SEGMENTED, Outcome.PROPAGATED)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Span:
     """One job on the simulated cores. Times are simulated nanoseconds, zero at the first frame's stamp.
 
@@ -50,7 +50,7 @@ class Span:
     end_ns: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class FrameResult:
     """The record of one frame in one run.
 

@@ -1,7 +1,9 @@
 """From a finished replay to what the report's views are made from."""
 
-from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 
 from stsem.document.schema import Document
@@ -14,10 +16,10 @@ from stsem.replay.record import Record
 from stsem.replay.runs import Context
 from stsem.report.annotated import AnnotatedLog
 from stsem.report.inputs import FrameRow, ReportInputs, StripFrame
-from stsem.result import Span
-from stsem.sim.trace import RunTrace, marks_of, trace_bytes
+from stsem.sim.trace import RunTrace, marks_of, write_trace
 
 MAX_POSE_GAP_NS = 150_000_000
+_FRAME = attrgetter("frame")
 
 
 def report_inputs(context: Context, document: Document, scratch: Path, *, plots: bool) -> ReportInputs:
@@ -29,7 +31,7 @@ def report_inputs(context: Context, document: Document, scratch: Path, *, plots:
         frames=tuple(row for run in replayed.runs for row in _rows(run, replayed)),
         strip=_strip(replayed),
         strip_pass="offline" if any(run.offline is not None for run in replayed.runs) else "delivered",
-        trace=_trace(context) if clocked else None,
+        trace=(lambda path: write_trace(path, _traces(context))) if clocked else None,
         trajectory=_trajectory(context.log),
         point_cloud=_map(context, scratch),
         plots=plots,
@@ -45,19 +47,18 @@ def annotate_map(annotated: AnnotatedLog, context: Context) -> None:
 
 
 def _rows(run: ModeRun, replayed: Replayed) -> list[FrameRow]:
-    spans: dict[int, list[Span]] = defaultdict(list)
-    for span in run.spans:
-        spans[span.frame].append(span)
+    by_frame = sorted(run.spans, key=_FRAME)
+    spans = {frame: tuple(jobs) for frame, jobs in groupby(by_frame, _FRAME)}
     offline, own, streaming = _accuracies(run.offline), _accuracies(run.real_time), {}
     if run.real_time is not None and run.real_time.scorecard is not None:
         streaming = run.real_time.scorecard.streaming_pixel_accuracy()
     sources = {} if run.offline is None else {r.index: r.keyframe for r in run.offline.results}
-    stamps = {slot.index: slot.log_stamp_ns for slot in replayed.slots}
+    first = replayed.slots[0].index if replayed.slots else 0
     return [
         FrameRow(
             mode=run.mode.name,
-            result=replace(result, spans=tuple(spans[result.index])),
-            log_stamp_ns=stamps[result.index],
+            result=replace(result, spans=spans.get(result.index, ())),
+            log_stamp_ns=replayed.slots[result.index - first].log_stamp_ns,
             offline_keyframe=sources.get(result.index),
             offline=offline.get(result.index),
             delivered=own.get(result.index),
@@ -87,15 +88,12 @@ def _strip(replayed: Replayed) -> tuple[StripFrame, ...]:
     return tuple(strip)
 
 
-def _trace(context: Context) -> bytes:
+def _traces(context: Context) -> Iterator[RunTrace]:
     stamps = {slot.index: slot.log_stamp_ns for slot in context.replayed.slots}
-    return trace_bytes(
-        [
-            RunTrace(run.mode.name, context.config.cores, stamps, run.spans, marks_of(run.real_time.results))
-            for run in context.replayed.runs
-            if run.real_time is not None
-        ]
-    )
+    for run in context.replayed.runs:
+        if run.real_time is not None:
+            marks = marks_of(run.real_time.results)
+            yield RunTrace(run.mode.name, context.config.cores, stamps, run.spans, marks)
 
 
 def _trajectory(log: Log) -> bytes | None:

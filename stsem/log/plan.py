@@ -15,7 +15,7 @@ MAX_CANDIDATES = 16
 NEEDS = frozenset({"depth", "pose"})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class FramePlan:
     """One colour frame and its partners. Log times are those of the recorder with the channel's clock offset taken out.
 

@@ -1,5 +1,6 @@
 """What is kept of every judged frame: enough for any score, stratum, pairing or resampling later, and no pixels."""
 
+from array import array
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -113,6 +114,22 @@ class Total:
         )
 
 
+class IndexSet:
+    """Which log indices have been met: a byte each."""
+
+    def __init__(self) -> None:
+        self._met = bytearray()
+
+    def __contains__(self, index: int) -> bool:
+        return index < len(self._met) and self._met[index] == 1
+
+    def add(self, index: int) -> None:
+        """Add `index`, which is not negative."""
+        if index >= len(self._met):
+            self._met.extend(bytes(index + 1 - len(self._met)))
+        self._met[index] = 1
+
+
 class FrameTallies:
     """Keeps the tally of every frame of one judgement.
 
@@ -125,8 +142,8 @@ class FrameTallies:
 
     def __init__(self, classes: int) -> None:
         self._classes = classes
-        self._stamps: dict[int, int] = {}
-        self._tallies: dict[int, npt.NDArray[np.int32]] = {}
+        self._frames, self._tallies = array("q"), array("i")
+        self._seen = IndexSet()
 
     def update(self, index: int, stamp_ns: int, matrix: Matrix) -> None:
         """Add the matrix (C, C + 1) of frame `index`.
@@ -134,17 +151,15 @@ class FrameTallies:
         Raises:
             ValueError: the frame was judged before.
         """
-        if index in self._tallies:
+        if index in self._seen:
             raise ValueError(f"frame {index} was judged twice; every frame is judged once")
-        self._stamps[index] = stamp_ns
-        self._tallies[index] = tally(matrix).astype(np.int32)
+        self._seen.add(index)
+        self._frames.extend((index, stamp_ns))
+        self._tallies.frombytes(tally(matrix).astype(np.int32).tobytes())
 
     def compute(self) -> Samples:
         """What bootstrap and pairing need."""
-        order = sorted(self._tallies)
-        empty = np.zeros((0, 3, self._classes), np.int64)
-        return Samples(
-            index=np.array(order, np.int64),
-            stamp_ns=np.array([self._stamps[i] for i in order], np.int64),
-            tallies=np.stack([self._tallies[i] for i in order]).astype(np.int64) if order else empty,
-        )
+        frames = np.array(self._frames, np.int64).reshape(-1, 2)
+        order = np.argsort(frames[:, 0])
+        tallies = np.array(self._tallies, np.int32).reshape(-1, 3, self._classes)
+        return Samples(frames[order, 0], frames[order, 1], tallies[order].astype(np.int64))

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.classes import ClassSet, Labels
-from stsem.metrics.accumulate import FrameTallies, Judged, Samples, Total
+from stsem.metrics.accumulate import FrameTallies, IndexSet, Judged, Samples, Total
 from stsem.metrics.by_distance import ByDistance, DistanceRow, DistanceSummary, summarise
 from stsem.metrics.confusion import confusion
 from stsem.metrics.durations import Durations, Summary
@@ -72,7 +72,7 @@ class Scorecard:
         self._own, self._streaming = self._total(), self._total()
         self._strata = {outcome: self._total() for outcome in STRATA}
         self._frames, self._instants = FrameTallies(len(classes)), FrameTallies(len(classes))
-        self._scored: set[int] = set()
+        self._scored = IndexSet()
         self._distances = ByDistance(len(classes))
         self._ages = Durations()
 

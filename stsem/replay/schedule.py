@@ -7,7 +7,7 @@ from fractions import Fraction
 from stsem.log.plan import FramePlan
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Slot:
     """One frame on the simulated clock.
 

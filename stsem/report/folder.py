@@ -38,6 +38,8 @@ def write_folder(inputs: ReportInputs, folder: Path) -> Path:
         for name, make in _FILES.items():
             if (data := make(inputs)) is not None:
                 (aside / name).write_bytes(data)
+        if inputs.trace is not None:
+            inputs.trace(aside / "trace.json")
         for name, made in (("map.ply", inputs.point_cloud), ("annotated.mcap", inputs.annotated)):
             if made is not None:
                 shutil.copyfile(made, aside / name)
@@ -48,7 +50,6 @@ def write_folder(inputs: ReportInputs, folder: Path) -> Path:
 _FILES: dict[str, Callable[[ReportInputs], bytes | None]] = {
     "report.json": lambda inputs: to_bytes(inputs.document),
     "frames.csv": frames_csv,
-    "trace.json": lambda inputs: inputs.trace,
     "trajectory.txt": lambda inputs: inputs.trajectory,
 }
 

@@ -1,5 +1,6 @@
 """frames.csv: a row per frame and mode, times as exact integers."""
 
+from io import BytesIO
 from typing import Any
 
 import pandas as pd
@@ -7,29 +8,32 @@ import pandas as pd
 from stsem.report.inputs import FrameRow, ReportInputs
 from stsem.result import STAGES
 
+BLOCK_ROWS = 10_000
 _INTEGERS = (
     "frame", "log_stamp_ns", "stamp_ns", "arrival_ns", "taken_ns", "answered_ns", "keyframe", "distance_frames",
     "distance_ns", "latency_from_arrival_ns", "latency_from_stamp_ns", "waiting_ns", "offline_keyframe",
 )  # fmt: skip
 
 
-def frame_table(inputs: ReportInputs) -> pd.DataFrame:
-    """One row per frame and mode; integers are nullable Int64, so that an absent time stays exact and blank."""
-    stages = stages_of(inputs.frames)
-    records = []
+def frames_csv(inputs: ReportInputs) -> bytes:
+    """The bytes of frames.csv; floats in the shortest form that reads back equal. Tables are made block by block."""
+    stages, file = stages_of(inputs.frames), BytesIO()
+    file.write((",".join(_record_columns(stages)) + "\n").encode())
     for run in inputs.document.runs:
         rows = inputs.rows(run.mode)
         stamps = {row.result.index: row.log_stamp_ns for row in rows}
-        records += [_record(row, stamps, run.stages_inside, stages) for row in rows]
+        for begin in range(0, len(rows), BLOCK_ROWS):
+            block = rows[begin : begin + BLOCK_ROWS]
+            table = _table([_record(row, stamps, run.stages_inside, stages) for row in block], stages)
+            table.to_csv(file, header=False, index=False, lineterminator="\n")
+    return file.getvalue()
+
+
+def _table(records: list[dict[str, Any]], stages: tuple[str, ...]) -> pd.DataFrame:
+    """One row per record; integers are nullable Int64, so that an absent time stays exact and blank."""
     table = pd.DataFrame.from_records(records, columns=list(_record_columns(stages)))
     whole = [*_INTEGERS, *(f"{stage}_{kind}_ns" for stage in stages for kind in ("waiting", "service"))]
     return table.astype(dict.fromkeys(whole, "Int64"))
-
-
-def frames_csv(inputs: ReportInputs) -> bytes:
-    """The bytes of frames.csv; floats in the shortest form that reads back equal."""
-    text: str = frame_table(inputs).to_csv(index=False, lineterminator="\n")
-    return text.encode()
 
 
 def stages_of(rows: tuple[FrameRow, ...]) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """What a report is made from: the document, and what is too large for it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from stsem.frame import Image
 from stsem.result import FrameResult
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class FrameRow:
     """One frame of one run.
 
@@ -75,7 +75,7 @@ class ReportInputs:
         frames: rows of all runs, run after run in the document's order, by log index within a run.
         strip: up to about five frames worth looking at.
         strip_pass: which pass the strip's answers come from: `offline`, `delivered` or `streaming`.
-        trace: bytes of trace.json; None without a clock.
+        trace: writes trace.json to a path; None without a clock.
         answer_classes: classes of the answers where the log has no class table; None where it has.
         trajectory: bytes of trajectory.txt; None without poses.
         point_cloud: the finished map.ply, copied into the folder; None without a map.
@@ -87,7 +87,7 @@ class ReportInputs:
     frames: tuple[FrameRow, ...] = ()
     strip: tuple[StripFrame, ...] = ()
     strip_pass: str = "offline"
-    trace: bytes | None = None
+    trace: Callable[[Path], None] | None = None
     trajectory: bytes | None = None
     answer_classes: ClassSet | None = None
     point_cloud: Path | None = None

@@ -20,7 +20,7 @@ SCHEMA = "stsem-trace/1"
 Event = dict[str, Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Mark:
     """An instant that holds no core.
 
@@ -69,11 +69,16 @@ def marks_of(results: Iterable[FrameResult]) -> list[Mark]:
     return marks
 
 
-def trace_bytes(runs: Sequence[RunTrace]) -> bytes:
-    """The file `trace.json`: one event per line; equal runs give equal bytes."""
-    events = [event for pid, run in enumerate(runs, start=1) for event in _events(pid, run)]
-    head = f'{{"displayTimeUnit":"ms","otherData":{{"schema":{_json(SCHEMA)}}},"traceEvents":[\n'
-    return (head + ",\n".join(map(_json, events)) + "\n]}\n").encode()
+def write_trace(path: Path, runs: Iterable[RunTrace]) -> None:
+    """Write the file `trace.json`: one event per line; equal runs give equal bytes. No more than one run is held."""
+    with path.open("wb") as file:
+        file.write(f'{{"displayTimeUnit":"ms","otherData":{{"schema":{_json(SCHEMA)}}},"traceEvents":['.encode())
+        between = b"\n"
+        for pid, run in enumerate(runs, start=1):
+            for event in _events(pid, run):
+                file.write(between + _json(event).encode())
+                between = b",\n"
+        file.write(b"\n]}\n")
 
 
 def read_durations(path: Path) -> tuple[dict[str, Durations], str]:

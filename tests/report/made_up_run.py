@@ -1,6 +1,7 @@
 """A made-up run that looks like a real one: 150 frames of an office at 10 Hz, two modes, a two-core schedule."""
 
 from math import ceil
+from pathlib import Path
 
 import numpy as np
 from made_up_origin import host, identity, made_up_input
@@ -53,7 +54,7 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
         host=host(),
     )
     strip = tuple(strip_frame(i, truth) for i in (12, 47, 90, 131)) if pictures else ()
-    trace = b'{"traceEvents":[]}\n' if clock else None
+    trace = _write_trace if clock else None
     return ReportInputs(
         sealed(document),
         rows,
@@ -62,6 +63,10 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
         trajectory=b"# stamp x y z qx qy qz qw\n",
         answer_classes=ClassSet(CLASSES),
     )
+
+
+def _write_trace(path: Path) -> None:
+    path.write_bytes(b'{"traceEvents":[]}\n')
 
 
 def _with_accuracy(mode: str, result: FrameResult, truth: bool) -> FrameRow:

@@ -9,7 +9,7 @@ from stsem.errors import CostError
 from stsem.result import Span
 from stsem.sim.costs import ConstantCosts, CostSource, MeasuredCosts, ProfileCosts, TraceCosts
 from stsem.sim.profile import CostProfile
-from stsem.sim.trace import RunTrace, read_durations, trace_bytes
+from stsem.sim.trace import RunTrace, read_durations, write_trace
 
 PROFILE = CostProfile("m", {"segment@2": tuple(range(100, 150)), "segment@1": tuple(range(200, 250)), "fuse@1": (7,)})
 
@@ -72,7 +72,7 @@ def test_an_earlier_trace_gives_back_its_exact_durations(tmp_path: Path) -> None
     slow = [Span(0, "segment", (0, 1), 0, 0, 11)]
     stamps = {0: 1_700_000_000_000_000_001, 1: 1_700_000_000_100_000_001}
     path = tmp_path / "trace.json"
-    path.write_bytes(trace_bytes([RunTrace("keyframe", 2, stamps, spans), RunTrace("per-frame", 2, stamps, slow)]))
+    write_trace(path, [RunTrace("keyframe", 2, stamps, spans), RunTrace("per-frame", 2, stamps, slow)])
     durations, sha256 = read_durations(path)
     costs = TraceCosts(durations, "keyframe", sha256)
     assert costs.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()

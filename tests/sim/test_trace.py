@@ -1,19 +1,27 @@
 """The trace file: what Perfetto needs, exact nanoseconds, equal bytes."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
 
 from stsem.errors import CostError
 from stsem.result import FrameResult, Outcome, Span
-from stsem.sim.trace import Mark, RunTrace, is_trace, marks_of, read_durations, schedule_text, trace_bytes
+from stsem.sim.trace import Mark, RunTrace, is_trace, marks_of, read_durations, schedule_text, write_trace
 
 STAMPS = {0: 100, 1: 200}
 SPANS = [Span(0, "segment", (0, 1), 0, 3, 1_000_000_000_000_001), Span(1, "propagate", (1,), 0, 5, 6)]
 MARKS = [Mark("arrivals", "arrived", 0, 3), Mark("answers", "segmented", 0, 1_000_000_000_000_001)]
 RUN = RunTrace("keyframe", 2, STAMPS, SPANS, MARKS)
+
+
+def trace_bytes(runs: Iterable[RunTrace]) -> bytes:
+    with TemporaryDirectory() as folder:
+        write_trace(Path(folder) / "trace.json", runs)
+        return (Path(folder) / "trace.json").read_bytes()
 
 
 def events(runs: list[RunTrace]) -> list[dict[str, Any]]:
