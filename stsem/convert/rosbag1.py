@@ -6,6 +6,7 @@ messages and connections in chunks.
 
 import bz2
 import struct
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +19,7 @@ from stsem.errors import ConversionError
 
 MAGIC = b"#ROSBAG V2.0\n"
 MAX_HEADER_BYTES = 16 << 20
-MAX_DATA_BYTES = 1 << 30
+MAX_DATA_BYTES = 1 << 28
 DAMAGED = "places in the bag that are damaged or cut off"
 UNINDEXED = "indexes that are missing or damaged, so that nobody knows whether the end of the bag is there"
 MISSING = "messages that the bag's index names and that cannot be read"
@@ -74,6 +75,11 @@ class _Index:
     messages: int = 0
     whole: bool = False
 
+    def next_chunk(self, at: int, size: int) -> int:
+        """Position of the first chunk behind `at`; `size` when there is none."""
+        k = bisect_right(self.chunks, at)
+        return self.chunks[k] if k < len(self.chunks) else size
+
 
 def messages(path: Path) -> Iterator[tuple[int, Message | Loss]]:
     """(bytes of the file done, a message or a loss), in the order in which they were recorded.
@@ -97,7 +103,7 @@ def _messages(path: Path, stream: BinaryIO, size: int) -> Iterator[tuple[int, Me
             record = _record(stream, at, size)
         except ValueError:
             yield at, Loss(DAMAGED)
-            at = next((chunk for chunk in index.chunks if chunk > at), size)
+            at = index.next_chunk(at, size)
             continue
         end = record.data_at + record.length
         if record.op == _CHUNK:
