@@ -89,8 +89,8 @@ def test_a_rectified_topic_is_not_rectified_again(
         assert opened.camera == expected
         np.testing.assert_array_equal(image_of(opened), picture(0))
         assert opened.info.warnings == (
-            "/camera/image_rect_color is rectified, by its name: the lens distortion that /camera/camera_info states is "
-            "not undone.",
+            "/camera/image_rect_color is rectified, by its name: the lens distortion that /camera/camera_info states "
+            "is not undone.",
         )  # fmt: skip
 
 
@@ -195,20 +195,33 @@ def test_the_calibration_of_registered_depth_serves_colour(
         assert len(opened.info.warnings) == (0 if serves and frame_id == "color_optical" else 1)
 
 
-def test_most_images_decide_the_size(recorder: Callable[..., Recorder]) -> None:
-    """The camera starts at another resolution, and one header lies; compressed or not."""
-    for name in ("raw", "png"):
-        log = recorder(f"{name}.mcap")
-        for i in range(8):
-            size, stamp = (16, 12) if i < 2 else (32, 24), BASE_NS + i * PERIOD_NS
-            if name == "raw":
-                image(log, "/cam", picture(i, *size), "rgb8", i=i)
-            else:
-                file = png(picture(i, *size)[..., ::-1])
-                payload = ROS.compressed(stamp, file, "png")
-                log.ros("/cam", "sensor_msgs/msg/CompressedImage", payload, stamp)
-        with open_log([log.close()]) as opened:
-            assert opened.size == (32, 24)
-            loaded = list(opened.frames(range(8), depth=False, previous=False, truth=False))
-            assert [one.frame is None for one in loaded] == [True, True, *[False] * 6]
-            assert opened.info.damage.counts == {"undecodable": {"/cam": 2}}
+def compressed(log: Recorder, i: int, file: bytes) -> None:
+    stamp = BASE_NS + i * PERIOD_NS
+    log.ros("/cam", "sensor_msgs/msg/CompressedImage", ROS.compressed(stamp, file, "png"), stamp)
+
+
+@pytest.mark.parametrize("form", ["raw", "png"])
+def test_most_images_decide_the_size(recorder: Callable[..., Recorder], form: str) -> None:
+    """The camera starts at another resolution."""
+    log = recorder()
+    for i in range(8):
+        pixels = picture(i, *((16, 12) if i < 2 else (32, 24)))
+        if form == "raw":
+            image(log, "/cam", pixels, "rgb8", i=i)
+        else:
+            compressed(log, i, png(pixels))
+    with open_log([log.close()]) as opened:
+        assert opened.size == (32, 24)
+        loaded = list(opened.frames(range(8), depth=False, previous=False, truth=False))
+        assert [one.frame is None for one in loaded] == [True, True, *[False] * 6]
+        assert opened.info.damage.counts == {"undecodable": {"/cam": 2}}
+
+
+def test_headers_of_broken_images_do_not_decide_the_size(recorder: Callable[..., Recorder]) -> None:
+    """Most say 64x48 and end early; the size is that of those that can be decoded."""
+    log = recorder()
+    for i in range(8):
+        compressed(log, i, png(picture(i)) if i in (3, 5) else png(picture(i, 64, 48))[:-200])
+    with open_log([log.close()]) as opened:
+        assert opened.size == (32, 24)
+        assert opened.frame(3, depth=False, previous=False).size == (32, 24)
