@@ -1,57 +1,91 @@
 """The choice of channels: what would be used of a log, told by topics, schemas and the first message."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 from made_up_logs import BASE_NS, LEVEL, PERIOD_NS, ROS, Recorder, label_picture, picture
+from mcap.records import Schema
 
 from stsem.errors import ChannelError, UsageError
+from stsem.log.choose import Candidate, choose_calibration
+from stsem.log.container.damage import Damage
 from stsem.log.info import Choice
 from stsem.log.log import open_log
+from stsem.log.pixels.look import Look
+from stsem.log.schemas.messages import Calibration
+from stsem.log.tracks import Track
 
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 K = [30.0, 0, 15.5, 0, 30.0, 11.5, 0, 0, 1]
 DEPTH = np.full((24, 32), 1000, "<u2")
+Message = tuple[str, Callable[[int, int, str], bytes]]
+
+
+def odometry(stamp_ns: int, parent: str, child: str, position: tuple[float, float, float]) -> bytes:
+    x, y, z = (float(v) for v in position)
+    still = ROS("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0)
+    level = ROS("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
+    pose = ROS("geometry_msgs/msg/Pose", position=ROS("geometry_msgs/msg/Point", x=x, y=y, z=z), orientation=level)
+    twist = ROS("geometry_msgs/msg/Twist", linear=still, angular=still)
+    unknown = np.zeros(36)
+    return ROS.encode(
+        ROS(
+            "nav_msgs/msg/Odometry", header=ROS.header(stamp_ns, parent), child_frame_id=child,
+            pose=ROS("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=unknown),
+            twist=ROS("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
+        )
+    )  # fmt: skip
+
+
+def calibration(topic: str, frame_id: str) -> Track:
+    """A channel of calibrations in `frame_id`, as the scan leaves it."""
+    name = "sensor_msgs/msg/CameraInfo"
+    made = Track(topic, Schema(id=1, name=name, encoding="ros2msg", data=ROS.schema(name)), "cdr", Damage())
+    made.calibrations.append(Calibration(None, frame_id, None))
+    return made
 
 
 def jpeg(i: int) -> bytes:
     return bytes(cv2.imencode(".jpg", picture(i))[1])
 
 
+def raw(encoding: str, pixels: Callable[[int], Any]) -> Message:
+    return IMAGE, lambda stamp, i, frame: ROS.image(stamp, pixels(i), encoding, frame_id=frame)
+
+
+MESSAGES: dict[str, Message] = {
+    "rgb": raw("rgb8", picture),
+    "mono": raw("mono8", label_picture),
+    "labels": raw("mono8", label_picture),
+    "odd": raw("tetrachrome", picture),
+    "depth": raw("16UC1", lambda _: DEPTH),
+    "jpeg": (COMPRESSED, lambda stamp, i, frame: ROS.compressed(stamp, jpeg(i), "jpeg", frame)),
+    "h264": (COMPRESSED, lambda stamp, _, frame: ROS.compressed(stamp, b"\0\0\0\1g", "h264", frame)),
+    "info": ("sensor_msgs/msg/CameraInfo", lambda stamp, _, frame: ROS.camera_info(stamp, 32, 24, K, frame)),
+    "pose": ("geometry_msgs/msg/PoseStamped", lambda stamp, _, __: ROS.pose(stamp, (0, 0, 0))),
+    "odometry": ("nav_msgs/msg/Odometry", lambda stamp, i, frame: odometry(stamp, "odom", frame, (float(i), 0, 0))),
+    "tf": (
+        "tf2_msgs/msg/TFMessage",
+        lambda stamp, i, frame: ROS.tf(stamp, [("world", frame, (float(i), 0.0, 0.0), LEVEL)]),
+    ),
+    "names": ("vision_msgs/msg/LabelInfo", lambda stamp, _, __: ROS.label_info(stamp, {0: "a", 1: "b", 2: "c"})),
+}
+"""kind -> (schema, payload of (stamp, number of the frame, frame_id))."""
+
+
 def record(path: Path, topics: dict[str, str], frames: int = 3) -> Path:
-    """A log with the given topics, each of one of a few kinds of messages."""
+    """A log with the given topics, each of one of a few kinds of messages: KIND, or KIND@FRAME_ID."""
     log = Recorder(path)
     for i in range(frames):
         stamp = BASE_NS + i * PERIOD_NS
-        for topic, kind in topics.items():
-            kind, _, frame = kind.partition("@")
-            frame = frame or "camera"
-            match kind:
-                case "rgb" | "mono" | "depth" | "odd" | "labels":
-                    encoding = {
-                        "rgb": "rgb8",
-                        "mono": "mono8",
-                        "depth": "16UC1",
-                        "odd": "tetrachrome",
-                        "labels": "mono8",
-                    }
-                    pixels = {"rgb": picture(i), "odd": picture(i), "depth": DEPTH}.get(kind, label_picture(i))
-                    log.ros(topic, IMAGE, ROS.image(stamp, pixels, encoding[kind], frame_id=frame), stamp)
-                case "jpeg":
-                    log.ros(topic, COMPRESSED, ROS.compressed(stamp, jpeg(i), "jpeg", frame), stamp)
-                case "h264":
-                    log.ros(topic, COMPRESSED, ROS.compressed(stamp, b"\0\0\0\1g", "h264", frame), stamp)
-                case "info":
-                    log.ros(topic, "sensor_msgs/msg/CameraInfo", ROS.camera_info(stamp, 32, 24, K, frame), stamp)
-                case "pose":
-                    log.ros(topic, "geometry_msgs/msg/PoseStamped", ROS.pose(stamp, (0, 0, 0)), stamp)
-                case "tf":
-                    payload = ROS.tf(stamp, [("world", frame, (float(i), 0.0, 0.0), LEVEL)])
-                    log.ros(topic, "tf2_msgs/msg/TFMessage", payload, stamp)
-                case "names":
-                    log.ros(topic, "vision_msgs/msg/LabelInfo", ROS.label_info(stamp, {0: "a", 1: "b", 2: "c"}), stamp)
+        for topic, asked in topics.items():
+            kind, _, frame = asked.partition("@")
+            schema, payload = MESSAGES[kind]
+            log.ros(topic, schema, payload(stamp, i, frame or "camera"), stamp)
     return log.close()
 
 
@@ -93,6 +127,61 @@ CHOICES = {
     ),
     "a pose when tf does not lead to the camera": (
         {"/cam": "rgb", "/tf": "tf@gripper", "/pose": "pose"}, ("/cam", None, "/pose", None, None),
+    ),
+    "labels of 16 bits": (
+        {"/cam": "rgb", "/semantic/image": "depth", "/info": "names"}, ("/cam", None, None, "/semantic/image", None),
+    ),
+    "classes before things": (
+        {"/cam": "rgb", "/instance_segmentation": "labels", "/semantic_segmentation": "labels", "/info": "names"},
+        ("/cam", None, None, "/semantic_segmentation", None),
+    ),
+    "things alone are no classes": (
+        {"/cam": "rgb", "/instance_segmentation": "labels"}, ("/cam", None, None, None, None),
+    ),
+    "ids before colours": (
+        {"/cam": "rgb", "/semantic/colored": "rgb", "/semantic/raw_labels": "labels", "/info": "names"},
+        ("/cam", None, None, "/semantic/raw_labels", None),
+    ),
+    "an overlay is neither labels nor colour": (
+        {"/cam/image": "rgb", "/net/semantic_overlay": "rgb"}, ("/cam/image", None, None, None, None),
+    ),
+    "infrared of 16 bits is no depth": (
+        {"/cam": "rgb", "/infra1/image_raw": "depth", "/thermal": "depth"}, ("/cam", None, None, None, None),
+    ),
+    "confidence is no depth": (
+        {"/cam": "rgb", "/zed/confidence_map": "depth", "/zed/range": "depth"},
+        ("/cam", "/zed/range", None, None, None),
+    ),
+    "the last word tells": (
+        {"/cam": "rgb", "/semantic_camera/depth": "depth", "/depth_camera/semantic": "labels", "/info": "names"},
+        ("/cam", "/semantic_camera/depth", None, "/depth_camera/semantic", None),
+    ),
+    "aligned depth before raw in the same frame": (
+        {"/k/rgb/image": "rgb", "/k/depth/image": "depth", "/k/depth_registered/image": "depth"},
+        ("/k/rgb/image", "/k/depth_registered/image", None, None, None),
+    ),
+    "thermal beside colour": (
+        {"/thermal/image": "mono", "/front/image": "mono"}, ("/front/image", None, None, None, None),
+    ),
+    "the calibration of a depth camera is not that of colour": (
+        {"/cam/image": "rgb", "/depth/camera_info": "info@depth"}, ("/cam/image", None, None, None, None),
+    ),
+    "a calibration in the same frame serves whatever its name": (
+        {"/cam/image": "rgb", "/depth/camera_info": "info"}, ("/cam/image", None, None, None, "/depth/camera_info"),
+    ),
+    "a calibration of each camera": (
+        {
+            "/color/image": "rgb", "/right/camera_info": "info", "/color/camera_info": "info",
+            "/left/camera_info": "info",
+        },
+        ("/color/image", None, None, None, "/color/camera_info"),
+    ),
+    "odometry before stamped poses": (
+        {"/cam": "rgb", "/odom": "odometry", "/pose": "pose"}, ("/cam", None, "/odom", None, None),
+    ),
+    "truth before odometry": (
+        {"/cam": "rgb", "/odom": "odometry", "/ground_truth/pose": "pose"},
+        ("/cam", None, "/ground_truth/pose", None, None),
     ),
     "a goal is no pose": ({"/cam": "rgb", "/move/goal_pose": "pose"}, ("/cam", None, None, None, None)),
 }  # fmt: skip
@@ -156,6 +245,41 @@ def test_overrides(tmp_path: Path) -> None:
         open_log([path], topics={"pose": "/camera/color/image_raw"})
     with pytest.raises(UsageError, match="role 'colour', but the roles are color, depth, pose, labels"):
         open_log([path], topics={"colour": "/cam"})
+
+
+def test_an_ambiguity_says_its_role_and_its_rivals(tmp_path: Path) -> None:
+    with pytest.raises(ChannelError) as caught:
+        open_log([record(tmp_path / "log.mcap", {"/left/image_raw": "rgb", "/right/image_raw": "rgb"})])
+    assert (caught.value.role, caught.value.rivals) == ("color", ("/left/image_raw", "/right/image_raw"))
+    with pytest.raises(ChannelError) as caught:
+        open_log([record(tmp_path / "log.mcap", {"/cam": "rgb"})], topics={"depth": "/deph"})
+    assert (caught.value.role, caught.value.rivals) == ("depth", ())
+
+
+def test_a_topic_of_two_schemas_is_that_which_fits(tmp_path: Path) -> None:
+    """The same topic as pose and as image: what was asked for picks the one that can play the role."""
+    log = Recorder(tmp_path / "log.mcap")
+    for i in range(3):
+        stamp = BASE_NS + i * PERIOD_NS
+        log.ros("/front", IMAGE, ROS.image(stamp, picture(i), "rgb8"), stamp)
+        log.ros("/front", "geometry_msgs/msg/PoseStamped", ROS.pose(stamp, (float(i), 0, 0)), stamp)
+    with open_log([log.close()], topics={"color": "/front", "pose": "/front"}) as opened:
+        assert (opened.info.choice.color, opened.info.choice.pose) == ("/front", "/front")
+        assert opened.frame(2, depth=False, previous=False).T_WC[0, 3] == 2
+
+
+def test_each_image_channel_has_its_calibration() -> None:
+    """Of colour, depth, infrared, and both sides of a stereo camera, each in a frame of its own."""
+    names = ("color", "depth", "infra1", "left", "right")
+    infos = [calibration(f"/cam/{name}/camera_info", f"{name}_optical") for name in names]
+    for name in names:
+        image = Candidate(calibration(f"/cam/{name}/image_raw", ""), Look("rgb", 8, "rgb8", f"{name}_optical"))
+        assert choose_calibration(infos, image).topic == f"/cam/{name}/camera_info"
+        without = Candidate(image.track, Look("rgb", 8, "rgb8", ""))
+        assert choose_calibration(infos, without).topic == f"/cam/{name}/camera_info"
+    right = Candidate(calibration("/cam/right/image_raw", ""), Look("rgb", 8, "rgb8", "right_optical"))
+    assert choose_calibration(infos[:4], right).topic == "/cam/color/camera_info"
+    assert choose_calibration(infos[1:4], right) is None
 
 
 def test_equally_near_depth_channels_are_said(tmp_path: Path) -> None:
