@@ -21,11 +21,13 @@ class Fox:
     """
 
     def image(
-        self, stamp_ns: int, pixels: Array, encoding: str, *, frame_id: str = "camera", padding: int = 0
-    ) -> Encoded:
+        self, stamp_ns: int, pixels: Array, encoding: str, *, frame_id: str = "camera", padding: int = 0,
+        size: tuple[int, int] | None = None,
+    ) -> Encoded:  # fmt: skip
+        """`size` is (width, height) where the rows of `pixels` are not those of the image."""
         rows = pixels.reshape(pixels.shape[0], -1).view(np.uint8)
         padded = np.pad(rows, ((0, 0), (0, padding)), constant_values=77)
-        height, width = pixels.shape[:2]
+        width, height = size or pixels.shape[1::-1]
         return self.encode(
             "RawImage", timestamp=stamp_ns, frame_id=frame_id, width=width, height=height, encoding=encoding,
             step=padded.shape[1], data=padded.tobytes(),

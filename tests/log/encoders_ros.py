@@ -77,14 +77,17 @@ class Ros:
         return self("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id, **count)
 
     def image(
-        self, stamp_ns: int, pixels: Array, encoding: str, *, frame_id: str = "camera", padding: int = 0
+        self, stamp_ns: int, pixels: Array, encoding: str, *, frame_id: str = "camera", padding: int = 0,
+        size: tuple[int, int] | None = None,
     ) -> Any:  # fmt: skip
+        """`size` is (width, height) where the rows of `pixels` are not those of the image."""
         rows = pixels.reshape(pixels.shape[0], -1).view(np.uint8)
+        width, height = size or pixels.shape[1::-1]
         padded = np.pad(rows, ((0, 0), (0, padding)), constant_values=77)
         return self.encode(
             self(
-                "sensor_msgs/msg/Image", header=self.header(stamp_ns, frame_id), height=pixels.shape[0],
-                width=pixels.shape[1], encoding=encoding, is_bigendian=int(pixels.dtype.byteorder == ">"),
+                "sensor_msgs/msg/Image", header=self.header(stamp_ns, frame_id), height=height, width=width,
+                encoding=encoding, is_bigendian=int(pixels.dtype.byteorder == ">"),
                 step=padded.shape[1], data=np.ascontiguousarray(padded).ravel(),
             )
         )  # fmt: skip
