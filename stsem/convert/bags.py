@@ -15,6 +15,7 @@ from stsem.log.mcapfile import McapFile
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 MAX_TIME_NS = 1 << 63
 MAX_CHANNELS = 10_000
+_NO_EFFECT = "Bags are copied as they are: give --classes and the like to stsem-replay, not here."
 _OUT_OF_TIME = "messages with a log time that cannot be"
 
 
@@ -44,7 +45,7 @@ def convert_rosbag1(source: Path, out: Path, options: Options, progress: Progres
         ConversionError: it is none, or holds no message; OutputError: the file cannot be written.
     """
     with McapFile(out, profile="ros1") as log:
-        copy = _Copy(log, source)
+        copy = _Copy(log, source, options)
         size = source.stat().st_size
         for done, found in rosbag1.messages(source):
             if isinstance(found, Loss):
@@ -64,14 +65,16 @@ def convert_rosbag2(source: Path, out: Path, options: Options, progress: Progres
     """
     scratch = out.with_name(f".{out.name}.{os.getpid()}{rosbag2.SUFFIX}")
     with McapFile(out, profile="ros2") as log:
-        copy = _Copy(log, source)
-        if missing := rosbag2.missing_files(source):
-            copy.lose(Loss("files that metadata.yaml names and that are not there", count=missing))
+        copy = _Copy(log, source, options)
+        files_missing, expected = rosbag2.stated(source)
         for found in _all_files(source, scratch, progress):
             if isinstance(found, Loss):
                 copy.lose(found)
             else:
                 copy.from_rosbag2(found)
+                expected -= 1
+        copy.lose(Loss("files that metadata.yaml names and that are not there", count=files_missing))
+        copy.lose(Loss("messages that metadata.yaml counts and that cannot be read", count=max(expected, 0)))
         return copy.summary()
 
 
@@ -96,8 +99,9 @@ def _all_files(source: Path, scratch: Path, progress: Progress) -> Iterator[rosb
 class _Copy:
     """Channels as they come to be needed, messages, and what is lost."""
 
-    def __init__(self, log: McapFile, source: Path) -> None:
+    def __init__(self, log: McapFile, source: Path, options: Options) -> None:
         self._log, self._source = log, source
+        self._notes = (_NO_EFFECT,) if options != Options() else ()
         self._known: dict[rosbag1.Connection | rosbag2.Topic, int | str] = {}
         self._channels: dict[tuple[str, int], int] = {}
         self._schemas: dict[tuple[str, str, str], int] = {}
@@ -105,7 +109,8 @@ class _Copy:
         self._sequences: Counter[int] = Counter()
 
     def lose(self, loss: Loss) -> None:
-        self._losses[loss.what] += loss.count
+        if loss.count:
+            self._losses[loss.what] += loss.count
 
     def from_rosbag1(self, message: rosbag1.Message) -> None:
         connection = message.connection
@@ -129,7 +134,7 @@ class _Copy:
         if not any(self._log.counts.values()):
             lost = "; ".join(f"{count} {what}" for what, count in losses.items()) or "it is empty"
             raise ConversionError(f"No message of {self._source} could be copied ({lost}): no log was written.")
-        return Summary(dict(self._log.counts), losses)
+        return Summary(dict(self._log.counts), losses, self._notes)
 
     def _rosbag2_channel(self, topic: rosbag2.Topic) -> int | str:
         """The channel of a topic, or why it has none."""

@@ -11,7 +11,8 @@ from stsem.frame import Depth
 
 def metres(units_per_metre: float) -> Callable[[npt.NDArray[Any]], Depth]:
     """From (H, W) uint16 samples, 0 unknown, to (H, W) float32 metres, NaN unknown."""
-    table: Depth = (np.arange(1 << 16) / units_per_metre).astype(np.float32)
+    with np.errstate(over="ignore"):
+        table: Depth = (np.arange(1 << 16) / units_per_metre).astype(np.float32)
     table[0] = np.nan
 
     def convert(samples: npt.NDArray[Any]) -> Depth:

@@ -51,6 +51,8 @@ def read(source: Path, options: Options) -> Recording:
     if not colors:
         raise ConversionError(f"{source} has no images (png, jpg or webp), neither in it nor in {', '.join(COLOR)}.")
     found = _Found(source, keys_of(colors))
+    if twins := len(colors) - len(found.keys.files):
+        found.losses.append(Loss("colour images of the same name as another one", count=twins))
     stamps = _stamps(found, options.rate_hz)
     truth = _truth(found, options)
     labels = _partners(found, LABELS, "label images") if truth else {}

@@ -21,6 +21,7 @@ from stsem.pose import Pose
 
 RESULTS, POSES, PARAMETERS = "results", "traj.txt", "cam_params.json"
 RATE_HZ, UNITS_PER_METRE = 30.0, 6553.5
+MAX_SIDE = 1 << 16
 CAMERA = Camera(1200, 680, 600.0, 600.0, 599.5, 339.5)
 _NAME = re.compile(r"(frame|depth)(\d{1,9})")
 
@@ -110,9 +111,9 @@ def camera_file(path: Path, root: Path) -> tuple[Camera, float]:
             [str(told[k]) for k in ("fx", "fy", "cx", "cy")] + [str(told.get("scale", 1000))]
         )
         width, height = (int(told.get(short, told.get(long))) for short, long in (("w", "width"), ("h", "height")))
-        if min(fx, fy, scale, width, height) <= 0:
-            raise ValueError("a number is not above zero")
+        if min(fx, fy, scale, width, height) <= 0 or max(width, height) > MAX_SIDE:
+            raise ValueError("a number is not above zero, or no image is so large")
         return Camera(width, height, fx, fy, cx, cy), scale
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as err:
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as err:
         form = '{"camera": {"w": 1200, "h": 680, "fx": 600, "fy": 600, "cx": 599.5, "cy": 339.5, "scale": 6553.5}}'
         raise ConversionError(f"{path} is not a camera ({err}); it should look like {form}.") from err

@@ -23,8 +23,10 @@ from stsem.errors import ConversionError, OutputError
 SUFFIX, PACKED_SUFFIX, METADATA = ".db3", ".db3.zstd", "metadata.yaml"
 MAX_MESSAGE_BYTES = 1 << 30
 MAX_UNPACKING = 1000
+MAX_METADATA_CHARACTERS = 16 << 20
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _LISTED = re.compile(r"^\s*-\s*[\"']?([^\s\"']+\.(?:db3|mcap)(?:\.zstd)?)[\"']?\s*$", re.MULTILINE)
+_COUNT = re.compile(r"^  message_count:\s*(\d{1,15})\s*$", re.MULTILINE)
 _PIECE = 1 << 20
 
 
@@ -65,13 +67,16 @@ def bag_files(source: Path) -> list[Path]:
     return []
 
 
-def missing_files(source: Path) -> int:
-    """How many files metadata.yaml names that are not there."""
-    with suppress(OSError):
-        text = (source / METADATA).read_text(errors="replace") if source.is_dir() else ""
+def stated(source: Path) -> tuple[int, int]:
+    """(files that metadata.yaml names and that are not there, messages that it counts); zeros without one."""
+    try:
+        with (source / METADATA).open(errors="replace") as stream:
+            text = stream.read(MAX_METADATA_CHARACTERS)
         names = {name.rsplit("/", 1)[-1] for name in _LISTED.findall(text)}
-        return sum(not (source / name).exists() for name in names)
-    return 0
+        count = _COUNT.search(text)
+        return sum(not (source / name).exists() for name in names), int(count[1]) if count else 0
+    except OSError:
+        return 0, 0
 
 
 def messages(path: Path, scratch: Path) -> Iterator[Message | Loss]:
