@@ -116,6 +116,13 @@ def test_tf_static_that_changes() -> None:
     assert warnings == ["The static transform w -> cam changes 20 times: taken as a moving one."]
 
 
+def test_what_was_asked_for_and_cannot_be_read_is_said() -> None:
+    empty = stamped("/pose")
+    assert find_poses([empty, odom("cam")], empty, "cam", COLOR) == (
+        None, ["/pose was asked for as the pose, but none of its messages can be read."],
+    )  # fmt: skip
+
+
 def test_transforms_at_a_low_rate_are_explained() -> None:
     source, warnings = find_poses([track("/tf", *line("w", "cam", range(0, 2001, 500)))], None, "cam", COLOR)
     assert [source.at(stamp) is not None for stamp in (0, 50 * MS, 500 * MS)] == [True, False, True]
@@ -159,6 +166,7 @@ def test_static_transforms_between_any_two_frames() -> None:
     np.testing.assert_allclose(static_transform(tracks, "cam", "ir"), cam_depth @ pose((0.5, 0, 0)), atol=1e-12)
     np.testing.assert_allclose(static_transform(tracks, "base_link", "cam"), T_BASE_CAM, atol=1e-12)
     np.testing.assert_allclose(static_transform(tracks, "cam", "cam"), np.eye(4))
+    assert static_transform(tracks, "", "") is None
     assert static_transform(tracks, "map", "cam") is None
     assert static_transform(tracks, "arm", "cam") is None
     assert static_transform(tracks, "cam", "elsewhere") is None

@@ -20,14 +20,12 @@ def transform_chain(tracks: Iterable[Track], camera_frame: str) -> tuple[PoseSou
 
 def chain_to(tree: FrameTree, camera_frame: str) -> tuple[PoseSource | None, list[str]]:
     """`transform_chain` of a tree that is already there."""
-    warnings = list(tree.warnings)
     frames, loop = tree.chain(camera_frame)
     if loop:
-        return None, [*warnings, f"The transforms run in a circle through {camera_frame!r}: poses are not used."]
-    edges, said = tree.edges(frames)
+        return None, [f"The transforms run in a circle through {camera_frame!r}: poses are not used."]
+    edges, warnings = tree.edges(frames)
     if edges and all(edge is not None and edge.static for edge in edges):
-        edges, said = tree.edges(frames, still=True)
-    warnings += said
+        edges, warnings = tree.edges(frames, still=True)
     known = [edge for edge in edges if edge is not None]
     if len(known) < len(edges):
         return None, [*warnings, f"The chain of transforms to {camera_frame!r} has a link without any transform."]

@@ -39,6 +39,8 @@ def find_poses(
         source, warnings = chain_to(tree, camera_frame.lstrip("/"))
     if source is None:
         track, said = (asked, "") if asked else choose_pose(tracks)
+        if asked and not asked.transforms:
+            warnings.append(f"{asked.topic} was asked for as the pose, but none of its messages can be read.")
         if track is not None and track.kind is Kind.POSE and track.transforms:
             source, more = topic_poses(track, tree, camera_frame)
             warnings = ([] if source else warnings) + ([said] if said else []) + more

@@ -16,6 +16,7 @@ MAX_DEPTH = 100
 MAX_STATIC_CHANGES = 10
 """A transform on tf_static that changes more often than this is a moving one on the wrong topic."""
 STATIC_SUFFIX = "tf_static"
+MAX_PARENTS_NAMED = 5
 Pair = tuple[str, str]
 
 
@@ -27,9 +28,12 @@ def is_static(track: Track) -> bool:
 def static_transform(tracks: Iterable[Track], target_frame: str, source_frame: str) -> Pose | None:
     """T_target_source (4, 4), metres: maps points of `source_frame` into `target_frame`, composed of static edges.
 
-    An edge is static when it is on a tf_static channel, or when all of its samples are equal. None when the frames are
-    not in one tree, or something between them moves. `tracks` may be all of a log; only transforms are looked at.
+    An edge is static when it is on a tf_static channel, or when all of its samples are equal. None when a frame has no
+    name, the frames are not in one tree, or something between them moves. `tracks` may be all of a log; only transforms
+    are looked at.
     """
+    if not (target_frame and source_frame):
+        return None
     transforms = [track for track in tracks if track.kind is Kind.TRANSFORMS]
     return FrameTree(transforms).static_transform(target_frame.lstrip("/"), source_frame.lstrip("/"))
 
@@ -42,7 +46,6 @@ class FrameTree:
 
     Attributes:
         parents: child -> parent.
-        warnings: about the tree as a whole.
     """
 
     def __init__(self, tracks: Iterable[Track]) -> None:
@@ -56,7 +59,8 @@ class FrameTree:
                 pair = parent.lstrip("/"), child.lstrip("/")
                 if pair[1] and (pair not in target or len(samples) > len(target[pair])):
                     target[pair], self._topics[pair] = samples, track.topic
-        self.parents, self.warnings = _vote(self._moving, self._static)
+        self._votes = _vote(self._moving, self._static)
+        self.parents = {child: max(sorted(given), key=given.__getitem__) for child, given in self._votes.items()}
 
     @cached_property
     def frames(self) -> tuple[str, ...]:
@@ -91,6 +95,9 @@ class FrameTree:
         """
         edges, warnings = [], []
         for pair in pairwise(frames):
+            if len(given := self._votes[pair[1]]) > 1:
+                rivals = ", ".join(sorted(given)[:MAX_PARENTS_NAMED])
+                warnings.append(f"The frame {pair[1]!r} has several parents ({rivals}); {pair[0]!r} is used.")
             edge, said = self._edge(pair, still=still)
             edges.append(edge)
             warnings += said
@@ -128,13 +135,9 @@ class FrameTree:
         return static_edge(cleaned, name), [*cleaned.warnings, changed]
 
 
-def _vote(moving: Mapping[Pair, Samples], static: Mapping[Pair, Samples]) -> tuple[dict[str, str], list[str]]:
+def _vote(moving: Mapping[Pair, Samples], static: Mapping[Pair, Samples]) -> dict[str, dict[str, int]]:
+    """child -> parent -> how many samples say so."""
     votes: dict[str, dict[str, int]] = defaultdict(dict)
     for (parent, child), samples in (*static.items(), *moving.items()):
         votes[child][parent] = votes[child].get(parent, 0) + len(samples)
-    parents = {child: max(sorted(given), key=given.__getitem__) for child, given in votes.items()}
-    warnings = [
-        f"The frame {child!r} has several parents ({', '.join(sorted(given))}); {parents[child]!r} is used."
-        for child, given in sorted(votes.items()) if len(given) > 1
-    ]  # fmt: skip
-    return parents, warnings
+    return votes
