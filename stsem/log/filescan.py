@@ -12,7 +12,7 @@ from stsem.log.container.ahead import ChunksAhead, Pending
 from stsem.log.container.audit import Audit
 from stsem.log.container.chunk import BrokenChunkError, Chunk
 from stsem.log.container.files import File
-from stsem.log.container.layout import FRAME, MESSAGE_HEAD, split, string_map
+from stsem.log.container.layout import FRAME, MESSAGE_HEAD, is_whole, split, string_map
 from stsem.log.container.records import GAP, Record
 from stsem.log.container.store import Store
 from stsem.log.definitions import Definitions
@@ -48,13 +48,20 @@ class FileScan:
         elif record.opcode == Opcode.CHUNK:
             self._ahead.chunk(place, record.body)
         elif record.opcode == Opcode.MESSAGE_INDEX:
-            if not self._ahead.index(record.body):
-                self._damage.count("contradiction")
-                self._ahead.gap(place)
-                self._ahead.index(record.body)
+            self._index(record.body, place)
+        elif record.opcode == Opcode.MESSAGE and self._ahead.waiting and is_whole(Opcode.MESSAGE_INDEX, record.body):
+            self._damage.count("bad_record")  # behind a chunk: an index with a wrong bit in its opcode
+            self._index(record.body, place)
         else:
             self._ahead.drain()
             self._outside(record, place)
+
+    def _index(self, body: bytes, place: int) -> None:
+        """A message index; one that follows no chunk is that of a lost one."""
+        if not self._ahead.waiting:
+            self._damage.count("contradiction")
+            self._ahead.gap(place)
+        self._ahead.index(body)
 
     def finish(self, *, data_has_crc: bool, summary_is_right: bool) -> None:
         """Behind the last record: messages whose channel came too late, or never; and what the file says of itself."""

@@ -63,15 +63,17 @@ class ChunksAhead:
         """A place that is no record: indexes behind it are those of a chunk that was lost."""
         self._append(Pending(place))
 
-    def index(self, body: bytes) -> bool:
-        """A message index; False when it follows no chunk."""
-        if not self._waiting:
-            return False
+    @property
+    def waiting(self) -> bool:
+        """Whether an index here belongs to a chunk or a gap."""
+        return bool(self._waiting)
+
+    def index(self, body: bytes) -> None:
+        """A message index, behind a chunk or a gap."""
         last = self._waiting[-1]
         last.index_bytes += len(body)
         if last.index_bytes <= MAX_INDEX_BYTES:
             last.indexes.append(body)
-        return True
 
     def drain(self) -> None:
         """Hand on all."""

@@ -70,11 +70,13 @@ def decompress(chunk: Chunk, data: memoryview | bytes, *, check: bool) -> bytes:
         records = _inflate(chunk, data)
     except (zstandard.ZstdError, RuntimeError, MemoryError) as err:
         raise BrokenChunkError("chunk_unreadable", str(err)) from err
-    if len(records) != chunk.uncompressed_size:
-        raise BrokenChunkError("chunk_unreadable", f"{len(records)} bytes came instead of {chunk.uncompressed_size}")
-    if check and chunk.crc and zlib.crc32(records) != chunk.crc:
+    length, crc = len(records), zlib.crc32(records) if check and chunk.crc else chunk.crc
+    if length == chunk.uncompressed_size and crc == chunk.crc:
+        return records
+    del records  # the traceback would keep them
+    if length == chunk.uncompressed_size:
         raise BrokenChunkError("chunk_crc", "the checksum differs")
-    return records
+    raise BrokenChunkError("chunk_unreadable", f"{length} bytes came instead of {chunk.uncompressed_size}")
 
 
 def _inflate(chunk: Chunk, data: memoryview | bytes) -> bytes:
