@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from stsem.cli.launch import verb
-from stsem.plain import plain
+from stsem.plain import MAX_SENTENCE, plain
 
 if TYPE_CHECKING:
     from stsem.convert.recording import Summary
@@ -81,5 +81,5 @@ def _print(target: Path, summary: "Summary") -> None:
 
     rows = [[plain(topic), f"{count}"] for topic, count in summary.messages.items()]
     print(tabulate(rows, ["topic", "messages"], disable_numparse=True, colalign=("left", "right")))
-    print(f"Log: {target} ({target.stat().st_size / 1e6:.1f} MB)")
-    print(f"stsem-replay {shlex.quote(str(target))}")
+    print(f"Log: {plain(str(target), MAX_SENTENCE)} ({target.stat().st_size / 1e6:.1f} MB)")
+    print(f"stsem-replay {plain(shlex.quote(str(target)), MAX_SENTENCE)}")

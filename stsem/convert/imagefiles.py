@@ -76,10 +76,18 @@ def walk(root: Path, depth: int) -> Iterator[Path]:
 def files(folder: Path, suffixes: Collection[str] = IMAGE_SUFFIXES) -> list[Path]:
     """Files of a folder with one of the `suffixes`, in natural order; empty when it cannot be listed."""
     try:
-        names = [e.name for e in os.scandir(folder) if e.name.lower().endswith(tuple(suffixes)) and e.is_file()]
+        names = [e.name for e in os.scandir(folder) if e.name.lower().endswith(tuple(suffixes)) and _is_file(e)]
     except OSError:
         return []
     return [folder / name for name in sorted(names, key=natural) if not name.startswith(".")]
+
+
+def _is_file(entry: os.DirEntry[str]) -> bool:
+    """Whether it may be opened: a file, or a link that leads nowhere, which is a loss later on."""
+    try:
+        return entry.is_file() or (entry.is_symlink() and not entry.is_dir())
+    except OSError:
+        return True
 
 
 def read_bytes(path: Path, root: Path, limit: int = MAX_FILE_BYTES) -> bytes:
@@ -97,6 +105,8 @@ def read_bytes(path: Path, root: Path, limit: int = MAX_FILE_BYTES) -> bytes:
             data = stream.read(limit + 1)
     except OSError as err:
         raise ValueError(f"it cannot be read ({err.strerror or err})") from err
+    except RuntimeError as err:  # what Python before 3.13 makes of a circle of links
+        raise ValueError("it is a link to itself") from err
     if len(data) > limit:
         raise ValueError(f"it is larger than {limit >> 20} MiB")
     return data

@@ -59,6 +59,14 @@ def test_the_source_is_never_the_target(cli: Cli, home: Path) -> None:
     assert (home / "x.bag").read_bytes() == b"#ROSBAG V2.0\n"
 
 
+def test_a_name_that_does_not_print_is_shown_escaped(cli: Cli, walk: Path, home: Path) -> None:
+    """It cannot reach the terminal as a command, nor stop the one line that says what was written."""
+    walk.rename(home / "walk\udcff\x1b[31m")
+    ran = cli("convert", home / "walk\udcff\x1b[31m")
+    assert ran.code == 0, ran.err
+    assert ran.out.splitlines()[-1] == r"stsem-replay 'walk\udcff\x1b[31m.mcap'"
+
+
 def test_losses_are_exit_code_3_with_counts(cli: Cli, walk: Path) -> None:
     (walk / "rgb/1.png").write_bytes(b"not an image")
     image(walk / "rgb/2.png", size=(8, 8))

@@ -1,6 +1,7 @@
 """Plain folders: what the names of folders and files say, and what is assumed where they say nothing."""
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,20 @@ def test_what_belongs_to_nothing_is_counted(tmp_path: Path) -> None:
         "label images that cannot be read": 1,
         "depth images of another size than the first": 1,
     }
+
+
+def test_links_and_pipes_do_no_harm(tmp_path: Path) -> None:
+    """A link to itself, to nowhere or out of the folder is a loss; a pipe is no image, and nobody waits for it."""
+    root = folder(tmp_path / "walk", frames=3)
+    (root / "rgb/frame_3.png").symlink_to("frame_3.png")
+    (root / "rgb/frame_4.png").symlink_to("nowhere.png")
+    (root / "rgb/frame_5.png").symlink_to(write(tmp_path / "secret.png", rgb(7)))
+    os.mkfifo(root / "rgb/frame_6.png")
+    (root / "poses.txt").unlink()
+    converted = convert(images.read, root, tmp_path / "log.mcap")
+    with converted.log as log:
+        assert len(log.plans) == 3
+    assert converted.summary.losses == {"colour images that cannot be read": 3}
 
 
 def test_labels_without_a_class_table_are_a_loss(tmp_path: Path) -> None:
