@@ -45,7 +45,7 @@ def convert(
     _check_positive(rate, "--rate")
     _check_positive(depth_scale, "--depth-scale")
     found = find_format(source, format_)
-    target = out or Path(f"{source.resolve().stem or 'log'}.mcap")
+    target = out or _default_target(source)
     _check_free(source, target, force)
     with progress(f"Converting {source.name}") as step:
         summary = found.convert(source, target, Options(rate, depth_scale, classes, sequence), step)
@@ -55,6 +55,13 @@ def convert(
         note(f"Left out: {count} {what}.")
     _print(target, summary)
     return EXIT_LOSSY if summary.losses else EXIT_FINE
+
+
+def _default_target(source: Path) -> Path:
+    """Here, named like the folder, or like the file without its suffixes."""
+    name = source.resolve().name
+    stem = name if source.is_dir() else name.partition(".")[0]
+    return Path(f"{stem or 'log'}.mcap")
 
 
 def _check_positive(value: float | None, flag: str) -> None:
