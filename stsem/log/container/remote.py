@@ -14,6 +14,8 @@ T = TypeVar("T")
 
 BLOCK_BYTES = 8 << 20
 BLOCKS_KEPT = 6
+IN_A_ROW = 2
+"""Steps from block to next block after which the one behind is fetched ahead: a look here and there is no run."""
 ATTEMPTS = 3
 MAX_LISTED = 10_000
 VERSIONS = ("ETag", "etag", "LastModified", "Last-Modified", "mtime", "created")
@@ -69,7 +71,7 @@ class BlockStream(io.BufferedIOBase):
         self._raw, self._size, self._shown = raw, size, shown
         self._blocks: OrderedDict[int, Future[bytes]] = OrderedDict()
         self._worker = ThreadPoolExecutor(1, "stsem-remote")
-        self._place, self._last = 0, -1
+        self._place, self._last, self._in_a_row = 0, -1, 0
 
     def readable(self) -> bool:
         """True."""
@@ -113,9 +115,11 @@ class BlockStream(io.BufferedIOBase):
 
     def _block(self, number: int) -> bytes:
         found = self._ask(number)
-        if number == self._last + 1 and (number + 1) * BLOCK_BYTES < self._size:
-            self._ask(number + 1)
-        self._last = number
+        if number != self._last:
+            self._in_a_row = self._in_a_row + 1 if number == self._last + 1 else 0
+            self._last = number
+            if self._in_a_row >= IN_A_ROW and (number + 1) * BLOCK_BYTES < self._size:
+                self._ask(number + 1)
         while len(self._blocks) > BLOCKS_KEPT:
             self._blocks.popitem(last=False)
         return found.result()
