@@ -26,6 +26,7 @@ from stsem.log.poses.source import PoseSource
 from stsem.log.poses.tree import static_transform
 from stsem.log.reading import ImageChannel
 from stsem.log.registration import REGISTERED, DepthReader, View, claims_colour_pixels, depth_reader
+from stsem.log.remark import Remark
 from stsem.log.scan import Scan
 from stsem.log.schemas.messages import Kind
 from stsem.log.sizes import usual_size
@@ -175,9 +176,8 @@ def _find_optics(
     if depth is None:
         return
     if size is None:
-        result.warnings.append(
-            f"No depth image of {depth.topic} can be decoded ({depth.look.name}): depth is not used."
-        )
+        sentence = f"No depth image of {depth.topic} can be decoded ({depth.look.name}): depth is not used."
+        result.warnings.append(Remark("depth-undecodable", sentence))
     else:
         views = View(depth, size, own_optics(tracks, depth, size)), View(color, result.size, result.optics)
         result.depth_reader, warnings = depth_reader(*views, registered, partial(static_transform, tracks))
@@ -192,24 +192,27 @@ def _find_classes(result: Assembly, scan: Scan, classes_file: Path | None) -> No
     nearest = nearest_track(tables, topic)
     messages = nearest.class_names[-1].names if nearest else None
     if nearest and len(nearest.class_names) > 1:
-        result.warnings.append(
+        sentence = (
             f"{nearest.topic} changes its class table {len(nearest.class_names) - 1} times; the last one is used."
         )
+        result.warnings.append(Remark("truth-two-tables", sentence))
     table, warnings = find_table(classes_file, messages, scan.metadata, scan.attachments)
     if result.labels is None:
         return
     result.warnings += warnings
     result.table = table
     if table is None:
-        result.warnings.append(
+        sentence = (
             f"{topic} holds labels, but no class table names them: accuracy cannot be measured (give --classes FILE)."
         )
+        result.warnings.append(Remark("truth-no-table", sentence))
 
 
 def _note_troubles(result: Assembly, tracks: Sequence[Track]) -> None:
     for track in tracks:
         if track.trouble:
-            result.warnings.append(f"{track.trouble[0].upper()}{track.trouble[1:]}; its messages are not used.")
+            sentence = f"{track.trouble[0].upper()}{track.trouble[1:]}; its messages are not used."
+            result.warnings.append(Remark("not-read", sentence))
 
 
 def _check_clocks(result: Assembly, tracks: Sequence[Track]) -> None:

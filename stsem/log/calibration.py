@@ -9,6 +9,7 @@ from stsem.frame import Depth, Image
 from stsem.geometry.undistort import Undistortion
 from stsem.log.choose import Candidate, choose_calibration
 from stsem.log.prefetch import Recent
+from stsem.log.remark import Remark
 from stsem.log.schemas.messages import Calibration
 from stsem.log.topicnames import RECTIFIED_WORDS
 from stsem.log.tracks import Track
@@ -94,10 +95,10 @@ def color_optics(
     if shared and depth:
         optics = read_optics(shared, color, size)
         sentence = f"{color.topic} has no calibration; that of {depth.topic}, registered to it, serves."
-        return replace(optics, warnings=(sentence, *optics.warnings))
+        return replace(optics, warnings=(Remark("intrinsics-borrowed", sentence), *optics.warnings))
     if track and owner:
         sentence = f"{track.topic} is the calibration of {owner.topic}; {color.topic} has none: no intrinsics."
-        return Optics(warnings=(sentence,))
+        return Optics(warnings=(Remark("intrinsics-missing", sentence),))
     return Optics()
 
 
@@ -122,16 +123,17 @@ def read_optics(track: Track, image: Candidate, size: Size) -> Optics:
     rectified = bool(image.words & RECTIFIED_WORDS)
     camera = next((found for c in track.calibrations if (found := _camera(c, rectified))), None)
     if camera is None:
-        return Optics(
-            track, warnings=(f"{track.topic} says that the camera is uncalibrated (K is zero): no intrinsics.",)
-        )
-    warnings = []
+        sentence = f"{track.topic} says that the camera is uncalibrated (K is zero): no intrinsics."
+        return Optics(track, warnings=(Remark("intrinsics-zero", sentence),))
+    warnings: list[str] = []
     if len(track.calibrations) > 1:
-        warnings.append(f"{track.topic} changes {len(track.calibrations) - 1} times; the first calibration is used.")
+        sentence = f"{track.topic} changes {len(track.calibrations) - 1} times; the first calibration is used."
+        warnings.append(Remark("intrinsics-change", sentence))
     if rectified and any(c.camera and c.camera.is_distorted for c in track.calibrations):
-        warnings.append(
+        sentence = (
             f"{image.topic} is rectified, by its name: the lens distortion that {track.topic} states is not undone."
         )
+        warnings.append(Remark("distortion-gone", sentence))
     camera, scaled = _for_size(camera, size, track.topic)
     optics = _straighten(track, camera)
     return replace(optics, warnings=(*warnings, *scaled, *optics.warnings))
@@ -154,9 +156,10 @@ def _for_size(camera: Camera, size: Size, topic: str) -> tuple[Camera, list[str]
     sentence = (
         f"{topic} is for {camera.width}x{camera.height}, the images are {size[0]}x{size[1]}: intrinsics are scaled"
     )
-    if not same_shape((camera.width, camera.height), size):
-        sentence += ", though the shape differs: if the images were cropped, depth and map are off"
-    return camera.scaled(*size), [f"{sentence}."]
+    if same_shape((camera.width, camera.height), size):
+        return camera.scaled(*size), [Remark("intrinsics-scaled", f"{sentence}.")]
+    sentence += ", though the shape differs: if the images were cropped, depth and map are off."
+    return camera.scaled(*size), [Remark("intrinsics-shape", sentence)]
 
 
 def _straighten(track: Track, camera: Camera) -> Optics:
@@ -166,10 +169,10 @@ def _straighten(track: Track, camera: Camera) -> Optics:
         rectifier = Rectifier(camera)
     except ValueError as err:
         sentence = f"The lens distortion that {track.topic} states cannot be undone ({err}): no intrinsics, no map."
-        return Optics(track, straight=False, warnings=(sentence,))
+        return Optics(track, straight=False, warnings=(Remark("distortion-unknown", sentence),))
     pinhole = replace(camera, distortion=(), model="")
     sentence = f"The lens distortion that {track.topic} states ({camera.model}) is undone."
-    return Optics(track, pinhole, rectifier, straight=False, warnings=(sentence,))
+    return Optics(track, pinhole, rectifier, straight=False, warnings=(Remark("distortion-undone", sentence),))
 
 
 def same_shape(a: Size, b: Size) -> bool:

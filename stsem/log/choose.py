@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from stsem.errors import ChannelError, UsageError
 from stsem.log import topicnames
 from stsem.log.pixels.look import Look
+from stsem.log.remark import Remark
 from stsem.log.schemas.messages import Kind
 from stsem.log.topicnames import (
     ALIGNED_WORDS,
@@ -177,7 +178,10 @@ def _best(
         return best, ""
     return (
         best,
-        f"{', '.join(rivals)} could all be the {nature} channel; {best.topic} is used (--topic {nature}=TOPIC).",
+        Remark(
+            "choice-unclear",
+            f"{', '.join(rivals)} could all be the {nature} channel; {best.topic} is used (--topic {nature}=TOPIC).",
+        ),
     )
 
 
@@ -225,7 +229,8 @@ def choose_pose(tracks: Iterable[Track]) -> tuple[Track | None, str]:
         return best, ""
     names = ", ".join(f"{track.topic} ({track.count})" for track in rivals[:RIVALS_NAMED])
     more = f" and {len(rivals) - RIVALS_NAMED} more" if len(rivals) > RIVALS_NAMED else ""
-    return best, f"{best.topic} ({best.count} messages) is used for the pose, not {names}{more} (--topic pose=TOPIC)."
+    sentence = f"{best.topic} ({best.count} messages) is used for the pose, not {names}{more} (--topic pose=TOPIC)."
+    return best, Remark("choice-unclear", sentence)
 
 
 def nearest_track(tracks: Iterable[Track], topic: str) -> Track | None:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from stsem.classes import NO_LABEL, ClassSet, Colour, Labels
 from stsem.errors import ClassTableError
+from stsem.log.remark import Remark
 
 METADATA = "stsem.classes"
 ATTACHMENT = "classes.json"
@@ -125,10 +126,14 @@ def find_table(
         return None, []
     first = tables[0]
     same = [t for t in tables if t.classes.names == first.classes.names and t.raw_ids == first.raw_ids]
-    warnings = [
-        f"The {t.source} names other classes than the {first.source}, which is used (--classes FILE for another)."
-        for t in tables if t not in same
-    ]  # fmt: skip
+    warnings: list[str] = [
+        Remark(
+            "truth-two-tables",
+            f"The {t.source} names other classes than the {first.source}, which is used (--classes FILE for another).",
+        )
+        for t in tables
+        if t not in same
+    ]
     coloured = next((t.classes.colours for t in same if t.classes.colours), ())
     ignored = tuple(sorted({raw for t in same for raw in t.ignored}))
     return replace(first, classes=ClassSet(first.classes.names, coloured), ignored=ignored), warnings

@@ -32,6 +32,7 @@ from stsem.log.plan import (
     window,
 )
 from stsem.log.prefetch import AHEAD, Recent, prefetched
+from stsem.log.remark import Remark
 from stsem.log.scan import scan
 from stsem.pose import Trajectory
 
@@ -124,7 +125,7 @@ class Log:
             sentence = (
                 f"{inexact} label images have no colour image of exactly their stamp and went to the nearest one."
             )
-            self._info = replace(info, warnings=(*info.warnings, sentence))
+            self._info = replace(info, warnings=(*info.warnings, Remark("truth-inexact", sentence)))
 
     def __enter__(self) -> Self:
         return self
@@ -153,7 +154,7 @@ class Log:
             return self._info
         frames, total = len(self._unknown_pixels), sum(self._unknown_pixels.values())
         sentence = f"{total} pixels in {frames} label images have an id or colour outside the class table: ignored."
-        return replace(self._info, warnings=(*self._info.warnings, sentence))
+        return replace(self._info, warnings=(*self._info.warnings, Remark("truth-unknown-ids", sentence)))
 
     def frame(self, index: int, *, depth: bool, previous: bool) -> Frame:
         """The frame at `index`; depth and the previous image are left out (None) where not asked for.

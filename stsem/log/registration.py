@@ -13,6 +13,7 @@ from stsem.log.calibration import Optics, Size, same_shape
 from stsem.log.choose import Candidate
 from stsem.log.pixels import decode
 from stsem.log.pixels.look import ImageMessage
+from stsem.log.remark import Remark
 from stsem.log.topicnames import ALIGNED_WORDS
 from stsem.pose import Pose
 
@@ -95,21 +96,24 @@ def depth_reader(
     if claimed and same_shape(depth.size, color.size) and not (registered == "auto" and _contradicted(depth, color)):
         return DepthReader(depth.size, _as_colour(depth, color, registered)), []
     if registered == "yes":
-        return None, [f"{depth} cannot have the pixels of {color}, being of another shape: depth is not used."]
+        sentence = f"{depth} cannot have the pixels of {color}, being of another shape: depth is not used."
+        return None, [Remark("depth-unregistered", sentence)]
     if registered == "no" and depth.optics.track is color.optics.track:
         depth = replace(depth, optics=Optics())  # one calibration for both would be the assumption that "no" forbids
     T, missing = _extrinsic(depth, color, extrinsic)
     if T is not None and depth.optics.camera and color.optics.camera:
         return _through(depth, color, T)
     if registered == "auto" and depth.size == color.size:
-        return DepthReader(depth.size, _as_colour(depth, color, registered)), [
+        sentence = (
             f"{depth.image.topic} is in frame {depth.frame_id!r} and colour in {color.frame_id!r}: "
             "taken as registered, being of the same size (--depth-registered yes|no)."
-        ]
-    return None, [
+        )
+        return DepthReader(depth.size, _as_colour(depth, color, registered)), [Remark("depth-assumed", sentence)]
+    sentence = (
         f"{depth} is not on the pixels of {color}, and to register it the log lacks {missing}: depth is not used "
         "(record that, or say --depth-registered yes if its pixels are those of colour)."
-    ]
+    )
+    return None, [Remark("depth-unregistered", sentence)]
 
 
 def _contradicted(depth: View, color: View) -> bool:
@@ -158,7 +162,7 @@ def _through(depth: View, color: View, T_color_depth: Pose) -> tuple[DepthReader
     metres = float(np.linalg.norm(T_color_depth[:3, 3]))
     sentence = f"{depth} is registered to {color} by calibrations and transforms ({metres:.3f} m apart)."
     steps = (*steps, DepthRegistration(source, target, T_color_depth))
-    return DepthReader(depth.size, steps), [*depth.optics.warnings, sentence]
+    return DepthReader(depth.size, steps), [*depth.optics.warnings, Remark("depth-registered", sentence)]
 
 
 def _same_pixels(a: Camera, b: Camera, share: float) -> bool:

@@ -9,6 +9,7 @@ from stsem.log.clocks import RESET_NS, clock_offset_ns, find_resets, out_of_rang
 from stsem.log.plan import depth_limit_ns, truth_limit_ns
 from stsem.log.poses.source import PoseSource
 from stsem.log.reading import ImageChannel
+from stsem.log.remark import Remark
 from stsem.log.tracks import Float64, Int64, References, Track
 
 MIN_GAP_NS = 1_000_000_000
@@ -30,10 +31,15 @@ def clock_warnings(
     offsets_ns: Mapping[str, int],
 ) -> list[str]:  # fmt: skip
     """One sentence for each thing that is odd about the stamps of what is used; `others` are its other channels."""
-    warnings = [
-        f"The clock of {topic} is off: its log times are {offset / 1e9:.3f} s behind its stamps or more; taken out."
+    warnings: list[str] = [
+        Remark(
+            "clock-offset",
+            f"The clock of {topic} is off: its log times are {offset / 1e9:.3f} s behind its stamps or more; "
+            "taken out.",
+        )
         for topic, offset in offsets_ns.items()
-    ] + _odd_frames(color)
+    ]
+    warnings += _odd_frames(color)
     for channel, limit_ns in ((depth, depth_limit_ns), (labels, truth_limit_ns)):
         if channel is not None:
             warnings += _set_back(channel)
@@ -61,43 +67,50 @@ def refuse_restarted(color: ImageChannel) -> None:
 
 def _odd_frames(color: ImageChannel) -> list[str]:
     """Repeated stamps and gaps."""
-    stamps, warnings = color.rows.stamp_ns, []
+    stamps = color.rows.stamp_ns
+    warnings: list[str] = []
     steps = np.diff(stamps)
     if not len(steps):
         return []
     if repeated := int((steps == 0).sum()):
-        warnings.append(f"{repeated} images of {color.topic} have the stamp of another one; each is a frame.")
+        sentence = f"{repeated} images of {color.topic} have the stamp of another one; each is a frame."
+        warnings.append(Remark("duplicates", sentence))
     gaps = np.flatnonzero(steps > max(MIN_GAP_NS, GAP_PERIODS * int(np.median(steps))))
     if len(gaps):
         longest = int(gaps[steps[gaps].argmax()])
         at = (int(stamps[longest]) - int(stamps[0])) / 1e9
         times = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
-        warnings.append(f"{color.topic} has {times} of {steps[longest] / 1e9:.3f} s at t = {at:.3f} s.")
+        sentence = f"{color.topic} has {times} of {steps[longest] / 1e9:.3f} s at t = {at:.3f} s."
+        warnings.append(Remark("gaps", sentence))
     return warnings
 
 
 def _set_back(channel: ImageChannel) -> list[str]:
     resets = find_resets(*_stamped(channel))
     return [
-        f"The clock of {channel.topic} was set back by {reset.back_ns / 1e9:.3f} s at log time {reset.log_ns} ns: "
-        "its images may meet the wrong colour images."
+        Remark(
+            "clock-reset",
+            f"The clock of {channel.topic} was set back by {reset.back_ns / 1e9:.3f} s at log time {reset.log_ns} ns: "
+            "its images may meet the wrong colour images.",
+        )
         for reset in resets[:1]
     ]
 
 
 def _unstamped(tracks: Sequence[Track]) -> list[str]:
     """Channels some or all of whose messages have no capture stamp."""
-    warnings = []
+    warnings: list[str] = []
     for track in tracks:
         if not track.unstamped:
             continue
         offsets = track.stamp_offsets_ns()
         off = np.median(offsets[offsets != 0]) / 1e9 if (offsets != 0).any() else 0.0
         far = f", which is {off:.3f} s off the stamps of the others" if out_of_range(round(off * 1e9)) else ""
-        warnings.append(
+        sentence = (
             f"{track.unstamped} of {track.count} messages on {track.topic} have no capture stamp: "
             f"their log time is used{far}."
         )
+        warnings.append(Remark("clock-unstamped", sentence))
     return warnings
 
 
@@ -114,19 +127,21 @@ def _skewed(color: References, channel: ImageChannel, limit_ns: int) -> list[str
     outside = (other.stamp_ns < first - RESET_NS) | (other.stamp_ns > last + RESET_NS)
     if outside.all():
         apart = float(np.median(other.stamp_ns - other.log_ns) - np.median(color.stamp_ns - color.log_ns)) / 1e9
-        return [
+        sentence = (
             f"The stamps of {channel.topic} are all outside those of the colour images, on a clock that differs by "
             f"about {apart:.3f} s: no frame has any of them; record both with one clock."
-        ]
+        )
+        return [Remark("clock-skew", sentence)]
     distance = _nearest(color.stamp_ns, other.stamp_ns[~outside])
     median, spread = float(np.median(distance)), float(np.ptp(np.percentile(distance, (5, 95))))
     if abs(median) <= limit_ns or spread > SKEW_SPREAD_NS:
         return []
     side = "behind" if median > 0 else "before"
-    return [
+    sentence = (
         f"The stamps of {channel.topic} lie evenly {abs(median) / 1e6:.1f} ms {side} the nearest colour stamps, more "
         f"than the {limit_ns / 1e6:.1f} ms that a pair may be apart: one of the clocks is off, and pairs are lost."
-    ]
+    )
+    return [Remark("clock-skew", sentence)]
 
 
 def _nearest(stamps: Int64, others: Int64) -> Float64:

@@ -160,7 +160,7 @@ def _channels(log: Log) -> dict[str, Channel]:
 
 
 def _warnings(context: Context) -> tuple[str, ...]:
-    found = [*context.log.info.warnings, *context.notes]
+    found = [*map(str, context.log.info.warnings), *context.notes]
     found += [
         f"{run.mode.name} answered no frame before its run ended: the jobs last too long for this log."
         for run in context.replayed.runs

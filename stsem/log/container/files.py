@@ -8,6 +8,7 @@ from pathlib import Path
 
 from stsem.errors import LogError
 from stsem.log.container.source import Source, is_url, local_file, local_path, unreadable
+from stsem.log.remark import Remark
 
 Given = Path | str
 """A path, or as a string also an address such as `https://host/run.mcap`."""
@@ -51,7 +52,11 @@ def left_out(paths: Iterable[Given]) -> list[str]:
     """A sentence for each file of a folder that looks like a part of the recording, but is not read."""
     folders = [path for given in paths if not is_url(given) and (path := local_path(given)).is_dir()]
     return [
-        f"{path.name} was left unfinished by a recorder or a copy and is not read; give it by name if it belongs here."
+        Remark(
+            "file-unfinished",
+            f"{path.name} was left unfinished by a recorder or a copy and is not read; "
+            "give it by name if it belongs here.",
+        )
         for folder in folders
         for path in sorted(folder.iterdir())
         if path.name.lower().endswith(_UNFINISHED)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stsem.log.clocks import find_resets
+from stsem.log.remark import Remark
 from stsem.log.tracks import Float64, Int64, Samples
 from stsem.pose import Trajectory, rotation
 
@@ -67,13 +68,15 @@ def clean(samples: Samples, what: str) -> Cleaned:
 
 
 def _value_warnings(norm: Float64, left_out: int, what: str) -> tuple[str, ...]:
-    warnings = []
+    warnings: list[str] = []
     if left_out:
-        warnings.append(f"{left_out} {what} are not finite or have a zero quaternion: left out.")
+        sentence = f"{left_out} {what} are not finite or have a zero quaternion: left out."
+        warnings.append(Remark("pose-values", sentence))
     off = np.abs(norm - 1)
     if far := int((off > UNIT_TOLERANCE).sum()):
         length = float(norm[off.argmax()])
-        warnings.append(f"{far} {what} have quaternions that are not of unit length (up to {length:.3g}): normalised.")
+        sentence = f"{far} {what} have quaternions that are not of unit length (up to {length:.3g}): normalised."
+        warnings.append(Remark("pose-values", sentence))
     return tuple(warnings)
 
 
@@ -87,12 +90,14 @@ def moving_edge(cleaned: Cleaned, name: str, what: str) -> tuple[Edge | None, li
     if len(unique) < len(group):
         other = int((cleaned.poses != poses[group]).any(axis=(1, 2)).sum())
         if other:
-            warnings.append(f"{other} {what} have the stamp of an earlier one and another value: left out.")
+            sentence = f"{other} {what} have the stamp of an earlier one and another value: left out."
+            warnings.append(Remark("pose-values", sentence))
     if resets := find_resets(cleaned.stamps_ns, cleaned.log_ns):
-        warnings.append(
+        sentence = (
             f"The stamps of the {what} go back by {resets[0].back_ns / 1e9:.3f} s at log time {resets[0].log_ns} ns: "
             "their clock was set back, and poses of two times are mixed up."
         )
+        warnings.append(Remark("clock-reset", sentence))
     return Edge(Trajectory(unique, poses), cleaned.log_ns[first], name=name), warnings
 
 

@@ -13,6 +13,7 @@ from stsem.log.poses.jumps import Jump, mark_jumps
 from stsem.log.poses.source import MAX_GAP_NS, PoseSource
 from stsem.log.poses.topics import topic_poses
 from stsem.log.poses.tree import FrameTree
+from stsem.log.remark import Remark
 from stsem.log.schemas.messages import Kind
 from stsem.log.tracks import Int64, Track
 
@@ -40,7 +41,8 @@ def find_poses(
     if source is None:
         track, said = (asked, "") if asked else choose_pose(tracks)
         if asked and not asked.transforms:
-            warnings.append(f"{asked.topic} was asked for as the pose, but none of its messages can be read.")
+            sentence = f"{asked.topic} was asked for as the pose, but none of its messages can be read."
+            warnings.append(Remark("pose-unreadable", sentence))
         if track is not None and track.kind is Kind.POSE and track.transforms:
             source, more = topic_poses(track, tree, camera_frame)
             warnings = ([] if source else warnings) + ([said] if said else []) + more
@@ -57,10 +59,11 @@ def _jump_warning(jumps: Sequence[Jump], color_stamps_ns: Int64) -> list[str]:
     far = max(jumps, key=lambda jump: (jump.metres, jump.degrees))
     seconds = (far.stamp_ns - int(color_stamps_ns[0])) / 1e9 if len(color_stamps_ns) else 0.0
     times = "once" if len(jumps) == 1 else f"{len(jumps)} times, the farthest"
-    return [
+    sentence = (
         f"The pose jumps {times} by {far.metres:.2f} m and {far.degrees:.0f} degrees at t = {seconds:.3f} s "
         f"({far.edge}); between the samples around a jump it is unknown."
-    ]
+    )
+    return [Remark("pose-jumps", sentence)]
 
 
 def _gap_warning(source: PoseSource, stamps_ns: Int64) -> list[str]:
@@ -83,7 +86,7 @@ def _gap_warning(source: PoseSource, stamps_ns: Int64) -> list[str]:
                 f"apart (it comes every {period_ms:.0f} ms)"
             )
     why = "; ".join(reasons) or "they lie where the pose jumps"
-    return [f"{count} of {len(stamps_ns)} frames have no pose: {why}."]
+    return [Remark("pose-missing", f"{count} of {len(stamps_ns)} frames have no pose: {why}.")]
 
 
 def _reasons(edge: Edge, stamps_ns: Int64) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:

@@ -8,6 +8,7 @@ from stsem.log.poses.body import BODY_OPTICAL, is_body_name, looks_like_body_fra
 from stsem.log.poses.edges import Edge, clean, moving_edge
 from stsem.log.poses.source import PoseSource
 from stsem.log.poses.tree import FrameTree
+from stsem.log.remark import Remark
 from stsem.log.tracks import Track
 from stsem.pose import Pose, Trajectory
 
@@ -22,7 +23,8 @@ def topic_poses(track: Track, tree: FrameTree, camera_frame: str) -> tuple[PoseS
     (parent, child), samples = max(track.transforms.items(), key=lambda item: (len(item[1]), item[0]))
     if len(track.transforms) > 1:
         names = ", ".join(sorted({repr(frame) for frame, _ in track.transforms}))
-        warnings.append(f"The poses of {track.topic} are in several frames ({names}); those in {parent!r} are used.")
+        sentence = f"The poses of {track.topic} are in several frames ({names}); those in {parent!r} are used."
+        warnings.append(Remark("pose-frames", sentence))
     what = f"poses of {track.topic}"
     edge, said = moving_edge(clean(samples, what), track.topic, what)
     warnings += said
@@ -31,11 +33,12 @@ def topic_poses(track: Track, tree: FrameTree, camera_frame: str) -> tuple[PoseS
     child, camera_frame = child.lstrip("/"), camera_frame.lstrip("/")
     if not child:
         if looks_like_body_frame(edge.trajectory):
-            warnings.append(
+            sentence = (
                 f"The poses of {track.topic} move along their own x axis with z upright, as a robot's body does and a "
                 "camera's optical frame (z forward) does not; they are used as they are: log the transform from the "
                 "body to the camera, and odometry that names its child frame."
             )
+            warnings.append(Remark("pose-body-frame", sentence))
         return PoseSource(track.topic, (parent, "camera"), (edge,), by_chain=False), warnings
     frames, edges, said = _down_to_camera(tree, child, camera_frame, track.topic)
     return PoseSource(track.topic, (parent, *frames), (edge, *edges), by_chain=False), warnings + said
@@ -57,11 +60,11 @@ def _down_to_camera(
         return (child, camera_frame), [_constant(aside, f"{child} -> {camera_frame}")], []
     begin = f"{topic} gives the pose of {child!r}, and no transform leads from there to the camera's frame "
     if is_body_name(child):
-        return (
-            (child, "camera"), [_constant(BODY_OPTICAL, "body -> optical")],
-            [f"{begin}{camera_frame!r}: the camera is taken to sit in {child!r} and to look along its x axis."],
-        )  # fmt: skip
-    return (child,), [], [f"{begin}{camera_frame!r}: {child!r} is taken as the camera's optical frame."]
+        sentence = f"{begin}{camera_frame!r}: the camera is taken to sit in {child!r} and to look along its x axis."
+        forward = _constant(BODY_OPTICAL, "body -> optical")
+        return (child, "camera"), [forward], [Remark("pose-body-frame", sentence)]
+    sentence = f"{begin}{camera_frame!r}: {child!r} is taken as the camera's optical frame."
+    return (child,), [], [Remark("pose-body-frame", sentence)]
 
 
 def _all(edges: Iterable[Edge | None]) -> list[Edge] | None:

@@ -8,6 +8,7 @@ from itertools import pairwise, takewhile
 import numpy as np
 
 from stsem.log.poses.edges import Cleaned, Edge, clean, moving_edge, static_edge
+from stsem.log.remark import Remark
 from stsem.log.schemas.messages import Kind
 from stsem.log.tracks import Samples, Track
 from stsem.pose import Pose, inverse
@@ -93,11 +94,13 @@ class FrameTree:
         A pair is static when its moving samples are all equal, too (many loggers repeat static transforms on tf),
         unless `still`: then they are those of something that does not move while it was recorded.
         """
-        edges, warnings = [], []
+        edges: list[Edge | None] = []
+        warnings: list[str] = []
         for pair in pairwise(frames):
             if len(given := self._votes[pair[1]]) > 1:
                 rivals = ", ".join(sorted(given)[:MAX_PARENTS_NAMED])
-                warnings.append(f"The frame {pair[1]!r} has several parents ({rivals}); {pair[0]!r} is used.")
+                sentence = f"The frame {pair[1]!r} has several parents ({rivals}); {pair[0]!r} is used."
+                warnings.append(Remark("pose-tree", sentence))
             edge, said = self._edge(pair, still=still)
             edges.append(edge)
             warnings += said
@@ -130,9 +133,10 @@ class FrameTree:
             return moving_edge(cleaned, name, what)
         if changes > MAX_STATIC_CHANGES:
             edge, warnings = moving_edge(cleaned, name, what)
-            return edge, [*warnings, f"The static transform {name} changes {changes} times: taken as a moving one."]
-        changed = f"The static transform {name} changes {changes} times; the last one holds for the whole log."
-        return static_edge(cleaned, name), [*cleaned.warnings, changed]
+            sentence = f"The static transform {name} changes {changes} times: taken as a moving one."
+            return edge, [*warnings, Remark("pose-static", sentence)]
+        sentence = f"The static transform {name} changes {changes} times; the last one holds for the whole log."
+        return static_edge(cleaned, name), [*cleaned.warnings, Remark("pose-static", sentence)]
 
 
 def _vote(moving: Mapping[Pair, Samples], static: Mapping[Pair, Samples]) -> dict[str, dict[str, int]]:
