@@ -119,11 +119,11 @@ def named(path: Path, name: str) -> Path:
             stamp = 1_700_000_000_000_000_000 + i * 100_000_000
             picture = np.full((16, 16, 3), 10 * i, np.uint8)
             messages: dict[str, Any] = {
-                f"/{name}": image(fox.CompressedImage, stamp, name, format="png", data=png(picture)),
+                f"/{name}": image(fox.CompressedImage, stamp, name[:500], format="png", data=png(picture)),
                 f"/labels/{name}": image(
-                    fox.RawImage, stamp, f"{name}2", encoding="mono8", width=16, height=16, step=16, data=bytes(256)
+                    fox.RawImage, stamp, f"{name[:500]}2", encoding="mono8", width=16, height=16, step=16, data=bytes(256)
                 ),
-                f"/pose/{name}": fox.PoseInFrame(timestamp=seconds(stamp), frame_id=name, pose=fox.Pose(
+                f"/pose/{name}": fox.PoseInFrame(timestamp=seconds(stamp), frame_id=name[:500], pose=fox.Pose(
                     position=fox.Vector3(x=0, y=0, z=0), orientation=fox.Quaternion(x=0, y=0, z=0, w=1))),
             }  # fmt: skip
             for topic, message in messages.items():

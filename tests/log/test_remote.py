@@ -67,7 +67,7 @@ def answers(paths: list[Any]) -> list[Any]:
 
 @pytest.mark.usefixtures("small_blocks")
 def test_a_whole_replay_needs_few_requests(bulky: bytes, tmp_path: Path) -> None:
-    """Two passes over S bytes, interleaved channels, two threads: at most 2 S / block + 10 requests, and 10 for looks."""
+    """Two passes over S bytes, mixed channels, two threads: at most 2 S / block + 10 requests, and 10 for looks."""
     (tmp_path / "bulky.mcap").write_bytes(bulky)
     does = Behaviour({"/logs/bulky.mcap": bulky})
     with serving(does) as host:
