@@ -63,7 +63,7 @@ def heads(data: bytes) -> list[int]:
 
 
 def mutants(data: bytes, draw: np.random.Generator, *, aligned: bool) -> Iterator[bytes]:
-    """Flips anywhere and in heads, cuts, overwritten, removed and inserted stretches; with `aligned`, of whole records."""
+    """Flips, cuts, overwritten, removed and inserted stretches; with `aligned`, also stretches of whole records."""
     places = heads(data)
 
     def flipped(at: int) -> bytes:

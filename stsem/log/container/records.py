@@ -16,7 +16,7 @@ from stsem.log.container.damage import Damage
 from stsem.log.container.fingerprint import Fingerprint
 from stsem.log.container.layout import FRAME, LAYOUT, is_head, is_whole
 from stsem.log.container.resync import Resync, own_length
-from stsem.log.container.source import Source
+from stsem.log.container.source import Source, changed
 
 MAGIC = b"\x89MCAP0\r\n"
 GAP = 0
@@ -94,20 +94,26 @@ class RecordWalk:
             return self._pass_by(opcode, length)
         body, following = self._file.read(length), self._file.read(FRAME.size)
         if len(body) < length:
-            raise LogError(f"{self._source} changed while it was being read; run again on a file at rest.")
+            raise changed(self._source)
         if opcode == Opcode.FOOTER and following.startswith(MAGIC):
             self._ended = True
             self._damage.count("unread_byte", n=self._size - end - len(MAGIC))
         elif not self._can_follow(end, following):
-            own = own_length(opcode, body)
-            found = self._search(opcode, place + 1 if own is None else place + FRAME.size + own)
-            broken = own is None and opcode in LAYOUT and opcode != Opcode.MESSAGE
-            if found is not None and (found < end or broken):
+            found = self._instead(opcode, body)
+            if found is not None:
                 self._dropped_bytes += length
                 return self._go_on(opcode, found)
             self._file.seek(end + len(following))
         head, self._place, self._head = self._head, end, following
         return self._accept(opcode, head, body, place)
+
+    def _instead(self, opcode: int, body: bytes) -> int | None:
+        """Nothing can stand behind this record: where the next one is if that is the fault of this record's length."""
+        behind = self._place + FRAME.size
+        own = own_length(opcode, body)
+        found = self._search(opcode, self._place + 1 if own is None else behind + own)
+        broken = own is None and opcode in LAYOUT and opcode != Opcode.MESSAGE
+        return found if found is not None and (found < behind + len(body) or broken) else None
 
     def _can_follow(self, end: int, following: bytes) -> bool:
         """Whether a record may stand at `end`, or the file ends there; also when too much was read twice already."""

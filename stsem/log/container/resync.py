@@ -29,21 +29,28 @@ class Resync:
     def __init__(self, file: BinaryIO, size: int) -> None:
         self._file, self._size = file, size
         self._searches = self._candidates = 0
+        self._last = (size, False, size)
 
     def next_record(self, start: int, *, chunked: bool) -> int | None:
         """The first place from `start` on that is a record; None when there is none. Moves the file's position."""
-        self._searches += 1
-        if self._searches > MAX_SEARCHES:
-            return None
+        searched, mode, found = self._last
+        if mode != chunked or not searched <= start <= found:
+            self._searches += 1
+            found = self._search(start, chunked) if self._searches <= MAX_SEARCHES else self._size
+            self._last = (start, chunked, found)
+        return found if found < self._size else None
+
+    def _search(self, start: int, chunked: bool) -> int:
+        """The place of the next record; the end of the file when there is none."""
         for place, opcode, length in self._heads(start):
             if chunked and opcode in IN_CHUNKS:
                 continue
             self._candidates += 1
             if self._candidates > MAX_CANDIDATES:
-                return None
+                break
             if self._is_record(place, opcode, length):
                 return place
-        return None
+        return self._size
 
     def _heads(self, start: int) -> Iterator[tuple[int, int, int]]:
         """(place, opcode, length) of everything that has the look of a head."""
