@@ -9,6 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from made_up_images import contents, encoded, rgb
 from mcap.reader import make_reader
 
@@ -298,3 +300,39 @@ def test_a_message_that_unpacks_to_too_much_is_left_out(tmp_path: Path) -> None:
         "messages that metadata.yaml counts and that cannot be read": 1,
     }
     assert sum(summary.messages.values()) == 2 * FRAMES - 1
+
+
+def mutated(data: st.DataObject, content: bytes) -> bytes:
+    """Bytes replaced, and perhaps the end cut off."""
+    changed = bytearray(content)
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(changed) - 1))
+        piece = data.draw(st.sampled_from([b"\0", b"\xff" * 4, b"\x7f", b"\0" * 64]))
+        changed[at : at + len(piece)] = piece
+    return bytes(changed[: data.draw(st.sampled_from([len(changed), len(changed) // 2, len(changed) - 1]))])
+
+
+@pytest.mark.parametrize("kind", ["LZ4", "BZ2", "plain", "sqlite3"])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_no_damage_is_a_traceback(tmp_path: Path, kind: str, data: st.DataObject) -> None:
+    """A log or a sentence, and in both cases nothing else is left behind."""
+    original = tmp_path / "original"
+    if kind == "sqlite3":
+        if not original.exists():
+            write_rosbag2(original)
+        source, content, convert = tmp_path / "x.db3", (original / "original.db3").read_bytes(), convert_rosbag2
+    else:
+        if not original.exists():
+            write_rosbag1(original, None if kind == "plain" else kind, chunk_bytes=2000)
+        source, content, convert = tmp_path / "x.bag", original.read_bytes(), convert_rosbag1
+    source.write_bytes(mutated(data, content))
+    out = tmp_path / "out.mcap"
+    out.unlink(missing_ok=True)
+    try:
+        summary = convert(source, out, Options(), lambda done, total: None)
+    except ConversionError:
+        assert not out.exists()
+    else:
+        assert sum(summary.messages.values()) == len(read_back(out))
+    assert {path.name for path in tmp_path.iterdir()} <= {"original", source.name, out.name}
