@@ -57,7 +57,7 @@ def _rows(run: ModeRun, replayed: Replayed) -> list[FrameRow]:
     return [
         FrameRow(
             mode=run.mode.name,
-            result=replace(result, spans=spans.get(result.index, ())),
+            result=replace(result, spans=spans[result.index]) if result.index in spans else result,
             log_stamp_ns=replayed.slots[result.index - first].log_stamp_ns,
             offline_keyframe=sources.get(result.index),
             offline=offline.get(result.index),

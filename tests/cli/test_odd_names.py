@@ -121,7 +121,8 @@ def named(path: Path, name: str) -> Path:
             messages: dict[str, Any] = {
                 f"/{name}": image(fox.CompressedImage, stamp, name[:500], format="png", data=png(picture)),
                 f"/labels/{name}": image(
-                    fox.RawImage, stamp, f"{name[:500]}2", encoding="mono8", width=16, height=16, step=16, data=bytes(256)
+                    fox.RawImage, stamp, f"{name[:500]}2", encoding="mono8", width=16, height=16, step=16,
+                    data=bytes(256),
                 ),
                 f"/pose/{name}": fox.PoseInFrame(timestamp=seconds(stamp), frame_id=name[:500], pose=fox.Pose(
                     position=fox.Vector3(x=0, y=0, z=0), orientation=fox.Quaternion(x=0, y=0, z=0, w=1))),
