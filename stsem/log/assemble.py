@@ -46,6 +46,8 @@ class Assembly:
         poses: where the camera's pose comes from.
         table: class table of the labels.
         clock_offsets_ns: topic -> what is taken out of its log times; only those that differ from 0.
+        images: every image channel, and what it holds.
+        asked: roles whose channel was asked for by name.
         warnings: one sentence each.
     """
 
@@ -58,6 +60,8 @@ class Assembly:
     poses: PoseSource | None = None
     table: ClassTable | None = None
     clock_offsets_ns: dict[str, int] = field(default_factory=dict)
+    images: Sequence[Candidate] = ()
+    asked: frozenset[str] = frozenset()
     warnings: list[str] = field(default_factory=list)
 
     @property
@@ -85,7 +89,7 @@ def assemble(
     channels = {id(t): ImageChannel(t, store, scan.damage) for t in tracks if t.kind in IMAGES and t.count}
     images = [Candidate(channel.track, channel.look()) for channel in channels.values()]
     color = _asked(images, asked, "color") or choose_color(images, tracks)
-    result = Assembly(channels[id(color.track)], (0, 0))
+    result = Assembly(channels[id(color.track)], (0, 0), images=images, asked=frozenset(asked))
     _refuse_unrelated(scan.files, result.color)
     refuse_restarted(result.color)
     result.size = _size(result.color)

@@ -1,12 +1,14 @@
 """The facts of an opened log: names, channels, what is used as what."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from stsem.log.assemble import Assembly
+from stsem.log.choose import Candidate
 from stsem.log.container.files import Given, natural
 from stsem.log.container.source import is_url, local_path, shown_name
 from stsem.log.info import ChannelInfo, Choice, LogInfo
@@ -19,8 +21,6 @@ from stsem.plain import MAX_NAME, plain
 
 def describe(paths: Sequence[Given], scan: Scan, assembly: Assembly) -> LogInfo:
     """Everything that can be said without decoding more images."""
-    tracks = sorted(scan.tracks.values(), key=lambda track: (track.topic, track.encoding, track.schema))
-    roles = _roles(assembly, tracks)
     stamps = assembly.color.rows.stamp_ns
     return LogInfo(
         name=log_name(paths),
@@ -28,14 +28,25 @@ def describe(paths: Sequence[Given], scan: Scan, assembly: Assembly) -> LogInfo:
         sha256=scan.sha256,
         size_bytes=sum(file.size for file in scan.files),
         duration_s=int(stamps[-1] - stamps[0]) / 1e9,
-        channels=tuple(_channel(track, roles.get(id(track), "")) for track in tracks),
+        channels=channel_infos(scan, assembly),
         choice=_choice(assembly),
+        reasons=_reasons(assembly, scan),
+        pose_frames=assembly.poses.frames if assembly.poses else (),
         damage=scan.damage,
+        unprotected=scan.unprotected,
         warnings=tuple(assembly.warnings),
         clock_offsets_ns=dict(assembly.clock_offsets_ns),
         library=scan.library,
         profile=scan.profile,
     )
+
+
+def channel_infos(scan: Scan, assembly: Assembly | None = None) -> tuple[ChannelInfo, ...]:
+    """Every channel, in order of topic; what it is used as and what its images hold only with an `assembly`."""
+    tracks = sorted(scan.tracks.values(), key=lambda track: (track.topic, track.encoding, track.schema))
+    roles = _roles(assembly, tracks) if assembly else {}
+    images = {id(image.track): image for image in assembly.images} if assembly else {}
+    return tuple(_channel(track, roles.get(id(track), ""), images.get(id(track))) for track in tracks)
 
 
 def log_name(paths: Sequence[Given]) -> str:
@@ -82,7 +93,27 @@ def _roles(assembly: Assembly, tracks: Sequence[Track]) -> dict[int, str]:
     return found
 
 
-def _channel(track: Track, role: str) -> ChannelInfo:
+def _reasons(assembly: Assembly, scan: Scan) -> dict[str, str]:
+    """Role -> why this channel: the rules of `choose` in a few words."""
+    rivals = Counter(image.nature for image in assembly.images)
+    camera = next((image.base for image in assembly.images if image.track is assembly.color.track), ())
+    same = sum(image.nature == "color" and image.base == camera for image in assembly.images)
+    of_color = "only one" if rivals["color"] == 1 else "most messages" if same == rivals["color"] else "by its name"
+    poses = sum(track.kind is Kind.POSE and track.count > 0 for track in scan.tracks.values())
+    reasons = {
+        "color": of_color,
+        "depth": "only one" if rivals["depth"] == 1 else "nearest to color",
+        "labels": "only one" if rivals["labels"] == 1 else "nearest to color",
+        "pose": "only one" if poses == 1 else "by its name",
+        "calibration": "belongs to color",
+    }
+    if assembly.poses and assembly.poses.by_chain:
+        reasons["pose"] = "chain of transforms"
+    reasons |= dict.fromkeys(assembly.asked, "asked for")
+    return {role: why for role, why in reasons.items() if getattr(_choice(assembly), role) is not None}
+
+
+def _channel(track: Track, role: str, image: Candidate | None) -> ChannelInfo:
     offsets = track.stamp_offsets_ns()
     first, last = track.first_log_ns, track.last_log_ns
     span = 0 if first is None or last is None else last - first
@@ -96,6 +127,10 @@ def _channel(track: Track, role: str) -> ChannelInfo:
         last_log_ns=last,
         offset_min_ns=int(offsets.min()) if len(offsets) else None,
         offset_median_ns=int(np.median(offsets)) if len(offsets) else None,
+        offset_max_ns=int(offsets.max()) if len(offsets) else None,
+        unstamped=track.unstamped,
         largest_gap_s=track.largest_gap_ns / 1e9 if track.count > 1 else None,
+        content=plain(image.look.name) if image else "",
+        nature=image.nature if image else "",
         role=role,
     )

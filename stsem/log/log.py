@@ -7,33 +7,24 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import numpy as np
-
 from stsem.camera import Camera
 from stsem.classes import ClassSet, Labels
 from stsem.errors import ChannelError, DecodeError
 from stsem.frame import Depth, Frame, Image
 from stsem.log.assemble import Assembly, assemble
 from stsem.log.classtable import Translator
+from stsem.log.container.damage import Damage
 from stsem.log.container.files import Given, find_files, left_out
 from stsem.log.container.store import Store
-from stsem.log.describe import describe
-from stsem.log.info import LogInfo
+from stsem.log.describe import channel_infos, describe
+from stsem.log.info import ChannelInfo, LogInfo
+from stsem.log.pairing import pair_all, plan_all
 from stsem.log.pixels import decode
 from stsem.log.pixels.look import ImageMessage
-from stsem.log.plan import (
-    UNKNOWN_PERIOD_NS,
-    FramePlan,
-    Partners,
-    make_plans,
-    median_period_ns,
-    pair_depth,
-    pair_truth,
-    window,
-)
+from stsem.log.plan import UNKNOWN_PERIOD_NS, FramePlan, median_period_ns, window
 from stsem.log.prefetch import AHEAD, Recent, prefetched
 from stsem.log.remark import Remark
-from stsem.log.scan import scan
+from stsem.log.scan import Scan, scan
 from stsem.pose import Trajectory
 
 IMAGES_KEPT = AHEAD + 4
@@ -81,20 +72,59 @@ def open_log(
         LogError: nothing can be read; ChannelError: no or no clear choice of channels; ClassTableError: a class table
         that cannot be used; UsageError: a role, a window or a value that cannot be.
     """
-    files = find_files(paths)
-    scanned = scan(files, progress)
-    store = Store(files, scanned.chunks, scanned.opened)
-    try:
-        assembly = assemble(scanned, store, topics or {}, classes_file, depth_registered)
-        rows = window(assembly.color.rows.stamp_ns, start_s, end_s)
-        assembly.warnings += left_out(paths)
-        return Log(assembly, describe(paths, scanned, assembly), store, rows)
-    except BaseException as err:
-        store.close()
-        if isinstance(err, ChannelError) and scanned.damage.lossy:
-            sentence = f"{str(err).rstrip('.')}; the log is damaged: {scanned.damage}."
-            raise type(err)(sentence, err.role, err.rivals) from err
-        raise
+    return scan_log(paths, progress).open(
+        topics=topics, classes_file=classes_file, depth_registered=depth_registered, start_s=start_s, end_s=end_s
+    )
+
+
+def scan_log(paths: Sequence[Given], progress: Callable[[int, int], None] | None = None) -> "ScannedLog":
+    """The first pass of `open_log`: what is in a log, before anything is chosen.
+
+    Raises:
+        LogError: nothing can be read.
+    """
+    return ScannedLog(paths, scan(find_files(paths), progress))
+
+
+class ScannedLog:
+    """A log whose messages are known, and nothing of its images; made by `scan_log`.
+
+    Args:
+        paths: as they were given.
+        scanned: what the first pass left.
+    """
+
+    def __init__(self, paths: Sequence[Given], scanned: Scan) -> None:
+        self._paths, self._scan = paths, scanned
+
+    @property
+    def channels(self) -> tuple[ChannelInfo, ...]:
+        """In order of topic, none of them used."""
+        return channel_infos(self._scan)
+
+    @property
+    def damage(self) -> Damage:
+        """What was found so far."""
+        return self._scan.damage
+
+    def open(
+        self, *, topics: Mapping[str, str] | None = None, classes_file: Path | None = None,
+        depth_registered: str = "auto", start_s: float | None = None, end_s: float | None = None,
+    ) -> "Log":  # fmt: skip
+        """Choose what is used; arguments and errors are those of `open_log`."""
+        scanned, paths = self._scan, self._paths
+        store = Store(scanned.files, scanned.chunks, scanned.opened)
+        try:
+            assembly = assemble(scanned, store, topics or {}, classes_file, depth_registered)
+            rows = window(assembly.color.rows.stamp_ns, start_s, end_s)
+            assembly.warnings += left_out(paths)
+            return Log(assembly, describe(paths, scanned, assembly), store, rows)
+        except BaseException as err:
+            store.close()
+            if isinstance(err, ChannelError) and scanned.damage.lossy:
+                sentence = f"{str(err).rstrip('.')}; the log is damaged: {scanned.damage}."
+                raise type(err)(sentence, err.role, err.rivals) from err
+            raise
 
 
 class Log:
@@ -116,11 +146,11 @@ class Log:
         self._unknown_pixels: dict[int, int] = {}
         self._images: Recent[int, Image] = Recent(self._decode_image, IMAGES_KEPT)
         self._truths: Recent[int, Labels | None] = Recent(self._decode_truth, IMAGES_KEPT)
-        self._partners, inexact = _pair(assembly)
+        self._partners, inexact = pair_all(assembly)
         self.camera: Camera | None = assembly.optics.camera
         self.classes: ClassSet | None = assembly.table.classes if assembly.table else None
         self.period_ns: int = median_period_ns(self._color.rows) or UNKNOWN_PERIOD_NS
-        self.plans: tuple[FramePlan, ...] = _plans(assembly, self._partners, rows)
+        self.plans: tuple[FramePlan, ...] = plan_all(assembly, self._partners, rows)
         if inexact:
             sentence = (
                 f"{inexact} label images have no colour image of exactly their stamp and went to the nearest one."
@@ -240,25 +270,3 @@ class Log:
             return self._depth.read(partner, self._assembly.depth_reader)
         except DecodeError:
             return None
-
-
-def _pair(assembly: Assembly) -> tuple[Partners, int]:
-    """(partners of every colour frame of the log, how many label images are not of exactly its stamp)."""
-    color = assembly.color.rows
-    none = np.full(len(color), -1, np.int64)
-    depth = pair_depth(color, assembly.depth.rows) if assembly.depth else none
-    if assembly.labels is None or assembly.table is None:
-        return Partners(depth, none), 0
-    truth, inexact = pair_truth(color, assembly.labels.rows)
-    return Partners(depth, truth), inexact
-
-
-def _plans(assembly: Assembly, partners: Partners, rows: slice) -> tuple[FramePlan, ...]:
-    channels, offset = (assembly.color, assembly.depth, assembly.labels), assembly.clock_offsets_ns
-    topics = [c.topic if c else None for c in channels] + [assembly.pose_topic]
-    color, depth, truth, pose = (offset.get(topic, 0) if topic else 0 for topic in topics)
-    return make_plans(
-        assembly.color.rows, assembly.depth.rows if assembly.depth else None,
-        assembly.labels.rows if assembly.labels else None, partners, assembly.poses, rows,
-        (color, depth, pose, truth),
-    )  # fmt: skip
