@@ -29,7 +29,7 @@ def short_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
-def test_files(replay: Cli, home: Path, short_log: Path, name: str) -> None:
+def test_files(replay: Cli, cli: Cli, home: Path, short_log: Path, name: str) -> None:
     """Replayed into the default place: a folder right below reports/, named after the file."""
     folder = home / "in"
     folder.mkdir()
@@ -44,6 +44,9 @@ def test_files(replay: Cli, home: Path, short_log: Path, name: str) -> None:
     assert written.parent.parent == home / "reports"
     assert all(home / "reports" in (p, *p.parents) for p in made)
     assert_report_is_harmless(written)
+    inspected = cli("inspect", path, "--json")
+    assert inspected.code == 0, inspected.err
+    assert len(json.loads(inspected.out)["log"]["files"]) == 1
 
 
 def test_arguments(cli: Cli, home: Path) -> None:

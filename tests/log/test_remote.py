@@ -157,6 +157,11 @@ def test_nobody_there() -> None:
     assert "cannot be read" in sentence(f"{host}/x.mcap")
 
 
+def test_a_query_may_choose_the_file(room_log: Path) -> None:
+    with serving(Behaviour({"/get": room_log.read_bytes()})) as host:
+        assert len(find_files([f"{host}/get?part=0", f"{host}/get?part=1"])) == 2
+
+
 def test_redirects_are_followed(room_log: Path) -> None:
     does = Behaviour({"/there.mcap": room_log.read_bytes()}, moved={"/here.mcap": "/there.mcap"})
     with serving(does) as host, open_log([f"{host}/here.mcap"]) as log:

@@ -41,7 +41,7 @@ def find_files(paths: Sequence[Given]) -> tuple[File, ...]:
     """
     if not paths:
         raise LogError("No log was given; give the path of an MCAP recording.")
-    unique = {os.path.realpath(str(s)) if not is_url(str(s)) else str(s): s for given in paths for s in _sources(given)}
+    unique = {_identity(given, source): source for given in paths for source in _sources(given)}
     files: list[File] = []
     for source in sorted(unique.values(), key=lambda s: (natural(s.name), str(s))):
         files.append(File(source, files[-1].base + files[-1].size if files else 0))
@@ -66,6 +66,11 @@ def left_out(paths: Iterable[Given]) -> list[str]:
 def natural(name: str) -> list[tuple[int, str]]:
     """Sort key of a name in which numbers count as numbers."""
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.findall(r"\d{1,18}|\D+", name)]
+
+
+def _identity(given: Given, source: Source) -> tuple[str, str]:
+    """What tells files apart: links to one file are one; of addresses also what is not shown, as a query may choose."""
+    return (str(given), str(source)) if is_url(given) else ("", os.path.realpath(str(source)))
 
 
 def _sources(given: Given) -> Sequence[Source]:
