@@ -21,3 +21,7 @@ class Remark(str):
         remark = super().__new__(cls, sentence)
         remark.name = name
         return remark
+
+    def __getnewargs__(self) -> tuple[str, str]:
+        """What makes a copy: reports are plain data made by copying."""
+        return self.name, str(self)
