@@ -6,10 +6,13 @@ from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
 from stsem.document.schema import Document
 from stsem.log.log import Log
 from stsem.mapping.ply import write_ply
-from stsem.pose import to_quaternion
+from stsem.pose import Trajectory, to_quaternion
 from stsem.replay.engine import Replayed
 from stsem.replay.lanes import ModeRun
 from stsem.replay.record import Record
@@ -19,6 +22,7 @@ from stsem.report.inputs import FrameRow, ReportInputs, StripFrame
 from stsem.sim.trace import RunTrace, marks_of, write_trace
 
 MAX_POSE_GAP_NS = 150_000_000
+BLOCK_STAMPS = 10_000
 _FRAME = attrgetter("frame")
 
 
@@ -100,14 +104,21 @@ def _trajectory(log: Log) -> bytes | None:
     """Camera poses at the colour stamps, TUM format: stamp in seconds, position, quaternion x y z w."""
     if log.trajectory is None:
         return None
+    stamps = np.array([plan.stamp_ns for plan in log.plans], np.int64)
     lines = ["# timestamp tx ty tz qx qy qz qw"]
-    for plan in log.plans:
-        sample = log.trajectory.at(plan.stamp_ns, MAX_POSE_GAP_NS)
-        if sample is not None:
-            numbers = [*sample.T_WC[:3, 3], *to_quaternion(sample.T_WC)]
-            seconds, rest = divmod(plan.stamp_ns, 10**9)
-            lines.append(f"{seconds}.{rest:09d} " + " ".join(f"{number:.9g}" for number in numbers))
+    for begin in range(0, len(stamps), BLOCK_STAMPS):
+        lines += _trajectory_lines(log.trajectory, stamps[begin : begin + BLOCK_STAMPS])
     return ("\n".join(lines) + "\n").encode()
+
+
+def _trajectory_lines(trajectory: Trajectory, stamps_ns: npt.NDArray[np.int64]) -> Iterator[str]:
+    found = trajectory.brackets(stamps_ns, MAX_POSE_GAP_NS)
+    known = stamps_ns[found.known]
+    poses = trajectory.between(known, found.earlier[found.known], found.later[found.known])
+    numbers = np.concatenate([poses[:, :3, 3], to_quaternion(poses)], axis=1)
+    for stamp_ns, row in zip(known.tolist(), numbers.tolist(), strict=True):
+        seconds, rest = divmod(stamp_ns, 10**9)
+        yield f"{seconds}.{rest:09d} " + " ".join(f"{number:.9g}" for number in row)
 
 
 def _map(context: Context, scratch: Path) -> Path | None:
