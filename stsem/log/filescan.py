@@ -43,6 +43,8 @@ class FileScan:
             self._ahead.gap(place)
             return
         self._audit.record(record)
+        if record.opcode == Opcode.MESSAGE and record.in_summary:
+            return  # a wrong bit made it of something else, which is a contradiction
         if record.length != len(record.body):
             self._damage.count("bad_record", n=int(record.opcode != Opcode.ATTACHMENT))
         elif record.opcode == Opcode.CHUNK:

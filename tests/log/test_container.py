@@ -124,6 +124,18 @@ def test_a_chunk_whose_kind_is_wrong_is_missed(room_log: Path, wrong: int) -> No
     assert {topic: n + lost.get(topic, 0) for topic, n in counts(result).items()} == whole
 
 
+def test_a_channel_of_the_summary_is_never_a_message(room_log: Path) -> None:
+    data = bytearray(room_log.read_bytes())
+    whole = counts(scanned(room_log, bytes(data)))
+    at = len(data) - len(MAGIC)
+    while data[at] != Opcode.CHANNEL or FRAME.unpack_from(data, at)[1] > 200:
+        at -= 1
+    data[at] = Opcode.MESSAGE
+    result = scanned(room_log, bytes(data))
+    assert counts(result) == whole
+    assert result.damage.counts == {"summary_crc": {"": 1}, "contradiction": {"": 1}}
+
+
 def test_what_stands_behind_the_closing_magic_is_counted_and_not_read(room_log: Path) -> None:
     data = room_log.read_bytes()
     whole = counts(scanned(room_log, data))
