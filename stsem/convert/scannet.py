@@ -164,6 +164,8 @@ def _opened(path: Path, source: Path) -> IO[bytes]:
         return path.open("rb")
     except OSError as err:
         raise ConversionError(f"{path} cannot be read: {err.strerror or err}.") from err
+    except RuntimeError as err:  # what Python before 3.13 makes of a circle of links
+        raise ConversionError(f"{path} is a link to itself; give the file itself.") from err
 
 
 def _note_header(header: sens.Header, notes: list[str]) -> None:
@@ -197,7 +199,8 @@ def _ascend(stamps_us: npt.NDArray[np.uint64]) -> bool:
 def _poses(index: sens.Index, header: sens.Header, notes: list[str]) -> dict[int, Pose]:
     """Frame -> T_WC of the colour camera; the file has those of the depth camera."""
     T_depth_color = np.eye(4) if header.T_color_depth is None else inverse(header.T_color_depth)
-    matrices = index.frames["camera_to_world"].astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        matrices = index.frames["camera_to_world"].astype(np.float64)
     poses = {frame: T_WD @ T_depth_color for frame, T_WD in enumerate(matrices) if is_rigid(T_WD)}
     if lost := len(index) - len(poses):
         notes.append(f"{lost} of {len(index)} frames have no pose: the reconstruction lost them.")

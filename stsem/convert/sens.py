@@ -70,7 +70,8 @@ def read_header(stream: IO[bytes], path: Path) -> Header:
     if name_bytes > _MAX_NAME:
         raise ConversionError(f"{path} says that its name has {name_bytes} bytes: it is broken or no .sens file.")
     _take(stream, name_bytes, path)
-    matrices = np.frombuffer(_take(stream, _MATRICES, path), "<f4").reshape(4, 4, 4).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a signalling NaN is no news: what is not finite is sorted out below
+        matrices = np.frombuffer(_take(stream, _MATRICES, path), "<f4").reshape(4, 4, 4).astype(np.float64)
     tail = _TAIL.unpack(_take(stream, _TAIL.size, path))
     color_size, depth_size = (tail[2], tail[3]), (tail[4], tail[5])
     for what, (width, height) in (("colour", color_size), ("depth", depth_size)):
