@@ -1,17 +1,25 @@
-"""`stsem inspect`: what is in a log, what would be used, and what looks wrong."""
+"""`stsem inspect`: what is in a log, what would be used, what looks wrong, and what to do about it."""
 
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from stsem.cli.launch import verb
 
-HELP = """Say what is in a log, what would be used as what, and what looks wrong.
+if TYPE_CHECKING:
+    from stsem.errors import StsemError
+    from stsem.log.log import ScannedLog
+
+HELP = """Say what is in a log, what would be used as what, what looks wrong, and what to do about it.
 
     stsem inspect log.mcap
-    stsem inspect log.mcap --json
-"""
+    stsem inspect log.mcap --topic color=/front/image --json
+
+Findings do not change the exit code: 0, 3 when the log is damaged, 1 when there is no clear choice, 5 when no image can be decoded.
+"""  # noqa: E501  typer breaks the lines of a paragraph itself
 
 
 @verb
@@ -24,21 +32,64 @@ def inspect(
         typer.Option("--topic", metavar="ROLE=TOPIC", help="Channel for color, depth, pose or labels."),
     ] = None,
     classes: Annotated[Path | None, typer.Option("--classes", help="Class table of the truth.")] = None,
+    depth_registered: Annotated[
+        str, typer.Option("--depth-registered", metavar="yes|no|auto", help="Are depth's pixels those of color?")
+    ] = "auto",
     json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> int:
     """Read the log once, and a sample of its frames."""
     from stsem.cli.console import progress
-    from stsem.cli.tables import inspection_text
+    from stsem.cli.foreign import pointing_to_convert
+    from stsem.cli.tables import inspection_text, terminal_width
     from stsem.document.canonical import canonical
-    from stsem.errors import EXIT_FINE, EXIT_LOSSY
+    from stsem.errors import EXIT_FINE, EXIT_LOSSY, ClassTableError, LogError
     from stsem.log.describe import log_name
-    from stsem.log.inspect import inspect_log
-    from stsem.log.log import open_log
+    from stsem.log.doctor.inspection import inspect_log
+    from stsem.log.log import scan_log
     from stsem.replay.settings import parse_topics
 
-    with progress(f"Reading {log_name(log)}") as step:
-        opened = open_log(log, topics=parse_topics(topic or []), classes_file=classes, progress=step)
+    topics = parse_topics(topic or [])
+    with progress(f"Reading {log_name(log)}") as step, pointing_to_convert(log):
+        scanned = scan_log(log, step)
+    try:
+        opened = scanned.open(topics=topics, classes_file=classes, depth_registered=depth_registered)
+    except (LogError, ClassTableError) as err:
+        _print_unopened(scanned, err, as_json=json_)
+        raise
     with opened:
         found = inspect_log(opened)
-        print(canonical(found.as_dict()).decode() if json_ else inspection_text(found), end="")
-        return EXIT_LOSSY if opened.info.damage.lossy else EXIT_FINE
+    if json_:
+        print(canonical(found.as_dict()).decode(), end="")
+    else:
+        command = _command(log, topic or [], classes, depth_registered)
+        print(inspection_text(found, command, terminal_width()), end="")
+    return EXIT_LOSSY if opened.info.damage.lossy else EXIT_FINE
+
+
+def _print_unopened(scanned: "ScannedLog", error: "StsemError", *, as_json: bool) -> None:
+    """What is in the log, so that one sees what can be chosen; the sentence itself goes to stderr."""
+    from dataclasses import asdict
+
+    from stsem.cli.tables import terminal_width, unopened_text
+    from stsem.document.canonical import canonical
+
+    if not as_json:
+        print(unopened_text(scanned.channels, scanned.damage, error, terminal_width()), end="")
+        return
+    known = {
+        "channels": [asdict(channel) for channel in scanned.channels],
+        "damage": scanned.damage.as_dict(),
+        "error": str(error),
+    }
+    print(canonical(known).decode(), end="")
+
+
+def _command(log: Sequence[str], topics: Sequence[str], classes: Path | None, depth_registered: str) -> str:
+    """The replay of what was inspected, as typed in a shell."""
+    from stsem.log.container.source import without_secrets
+
+    words = ["stsem-replay", *map(without_secrets, log)]
+    words += [word for topic in topics for word in ("--topic", topic)]
+    words += ["--classes", str(classes)] if classes else []
+    words += ["--depth-registered", depth_registered] if depth_registered != "auto" else []
+    return shlex.join(words)

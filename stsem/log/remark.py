@@ -22,6 +22,6 @@ class Remark(str):
         remark.name = name
         return remark
 
-    def __getnewargs__(self) -> tuple[str, str]:
+    def __reduce__(self) -> tuple[type[Self], tuple[str, str]]:
         """What makes a copy: reports are plain data made by copying."""
-        return self.name, str(self)
+        return type(self), (self.name, str(self))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from made_up_logs import BASE_NS, PERIOD_NS, ROS, Recorder, label_picture, picture
 
-from stsem.log.inspect import SAMPLED_FRAMES, inspect_log
+from stsem.log.doctor.inspection import inspect_log
+from stsem.log.doctor.seen import SAMPLED_FRAMES
 from stsem.log.log import open_log
 
 IMAGE = "sensor_msgs/msg/Image"
@@ -23,7 +24,7 @@ def test_an_inspection_is_plain_data(room_log: Path) -> None:
     }  # fmt: skip
     assert document["frames"] == {
         "count": 6, "with_depth": 6, "with_pose": 6, "with_truth": 6, "width": 32, "height": 24, "period_ms": 100.0,
-        "looked_at": 6, "undecodable": 0,
+        "looked_at": 6, "undecodable": 0, "dark": 0, "flat": 0,
     }  # fmt: skip
     color = next(c for c in document["channels"] if c["role"] == "color")
     assert (color["count"], color["rate_hz"], color["largest_gap_s"], color["offset_min_ns"]) == (

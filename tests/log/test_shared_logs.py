@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stsem.log.container.files import find_files
-from stsem.log.inspect import inspect_log
+from stsem.log.doctor.inspection import inspect_log
 from stsem.log.log import Log, open_log
 from stsem.log.scan import scan
 from stsem.log.sizes import LOOKED_AT
