@@ -58,6 +58,7 @@ class Ros:
 
     def __init__(self, version: int = 2, little_endian: bool = True) -> None:
         self.types, self.version, self.little_endian = _typestore(version), version, little_endian
+        self._definitions: dict[str, bytes] = {}
 
     def __call__(self, name: str, **fields: Any) -> Any:
         return self.types.types[name](**fields)
@@ -69,7 +70,10 @@ class Ros:
         return bytes(self.types.serialize_cdr(message, name, little_endian=self.little_endian))
 
     def schema(self, name: str) -> bytes:
-        return str(self.types.generate_msgdef(name, ros_version=self.version)[0]).encode()
+        if name not in self._definitions:
+            text, _ = self.types.generate_msgdef(name, ros_version=self.version)
+            self._definitions[name] = str(text).encode()
+        return self._definitions[name]
 
     def header(self, stamp_ns: int, frame_id: str) -> Any:
         stamp = self("builtin_interfaces/msg/Time", sec=stamp_ns // NS, nanosec=stamp_ns % NS)
