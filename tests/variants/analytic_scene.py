@@ -5,7 +5,7 @@ World: x east, y north, z up, metres. Everything follows from the intersection o
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -89,10 +89,10 @@ class Scene:
         """Whether image `i` is labelled."""
         return self.labelled is None or i in self.labelled
 
-    @cached_property
+    @property
     def views(self) -> tuple[View, ...]:
         """Of every image."""
-        return tuple(seen(self.camera, camera_pose(i), self.poster) for i in range(self.frames))
+        return _views(self.camera, self.frames, self.poster)
 
     @property
     def straight(self) -> "Scene":
@@ -104,6 +104,11 @@ class Scene:
         """(stamp, T_W_base) half a period before and behind every image: linear motion interpolates exactly."""
         found = {self.stamp_ns(i) + k * HALF_NS: i + 0.5 * k for i in range(self.frames) for k in (-1, 1)}
         return tuple((stamp, base_pose(time)) for stamp, time in sorted(found.items()))
+
+
+@cache
+def _views(camera: Camera, frames: int, poster: bool) -> tuple[View, ...]:
+    return tuple(seen(camera, camera_pose(i), poster) for i in range(frames))
 
 
 def base_pose(i: float) -> Pose:
