@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 
 from stsem.log.doctor.finding import Examined
+from stsem.log.doctor.seen import DEPTH_BINS
 
 BAD_SHARE = 0.5
 """Of the images looked at: a camera that sees nothing half of the time is not at work."""
 MIN_MEDIAN_M, MAX_MEDIAN_M = 0.1, 100.0
 """No camera on a robot has half of its pixels nearer than 10 cm, and no depth of a camera reaches 100 m. 16 bits of
 centimetres or metres read as millimetres lie below, floats of millimetres above."""
+FARTHEST_M = (DEPTH_BINS - 1) / 1000
 MAX_UNKNOWN = 0.6
 """A Kinect indoors misses 10 to 25 % of its pixels, stereo at plain walls up to 50 %."""
 MIN_VIEW_DEG, MAX_VIEW_DEG = 12.0, 140.0
@@ -58,9 +60,13 @@ def depth_unit(seen: Examined) -> Iterator[str]:
     if MIN_MEDIAN_M <= marks[50] <= MAX_MEDIAN_M:
         return
     yield (
-        f"Half of the known depth of {seen.info.choice.depth} ({seen.depth.content}) is below {marks[50]:.3f} m, 99 % "
-        f"below {marks[99]:.3f} m: that is the unit gone wrong."
+        f"The median depth of {seen.info.choice.depth} ({seen.depth.content}) is {_metres(marks[50])}, 99 % are below "
+        f"{_metres(marks[99])}: the unit is another one."
     )
+
+
+def _metres(value: float) -> str:
+    return f"{value:.3f} m" if value < FARTHEST_M else f"{FARTHEST_M:.0f} m or more"
 
 
 def depth_unknown(seen: Examined) -> Iterator[str]:
