@@ -9,7 +9,7 @@ from stsem.log.info import ChannelInfo
 from stsem.plain import plain
 
 NONE = "–"
-MIN_TOPIC = 16
+MIN_TOPIC = 12
 
 
 @dataclass(frozen=True)

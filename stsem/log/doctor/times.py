@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from stsem.log.doctor.finding import Examined
-from stsem.log.tracks import Int64
 
 UNEVEN_BY = 0.5
 """Of the period: an interval that is longer or shorter by half of it ..."""
@@ -16,7 +15,8 @@ MIN_INTERVALS = 10
 
 def rate_uneven(seen: Examined) -> Iterator[str]:
     """Colour frames at uneven intervals; repeated stamps are said elsewhere."""
-    steps: Int64 = np.diff(np.unique(seen.stamps_ns))
+    steps = np.diff(seen.stamps_ns)
+    steps = steps[steps > 0]
     if len(steps) < MIN_INTERVALS:
         return
     period = float(np.median(steps))
