@@ -114,8 +114,8 @@ FORMATS = {
 }  # fmt: skip
 """Rows -> what the format field says of the same jpeg."""
 EXACT = tuple(name for name, letters in CHANNELS.items() if len(letters) > 1)
-LEAST_DB = {"nv24": 40.0, "yuyv": 30.0, "uyvy": 30.0, "yuv422": 30.0, "yuv422_yuy2": 30.0, "yuy2": 30.0, "nv16": 30.0}
-JPEG = Equal(color_db=34.0)
+LEAST_DB = {"nv24": 48.0, "nv12": 32.0, "nv21": 32.0, "i420": 32.0}
+JPEG = Equal(color_db=33.5)
 
 RAW = (
     *(Variant(f"color-{name}", f"`{name}`, raw", color=color(raw(name))) for name in EXACT),
@@ -131,26 +131,26 @@ RAW = (
         equal=GREY,
     ),
     *(
-        Variant(f"color-{name}", f"`{name}`, raw", color=color(raw(name)), equal=Equal(color_db=26.0))
+        Variant(f"color-{name}", f"`{name}`, raw", color=color(raw(name)), equal=Equal(color_db=27.0))
         for name in MOSAICS
     ),
     *(
-        Variant(f"color-{name}", f"`{name}`, raw", color=color(raw(name)), equal=Equal(color_db=LEAST_DB.get(name, 28)))
+        Variant(f"color-{name}", f"`{name}`, raw", color=color(raw(name)), equal=Equal(color_db=LEAST_DB.get(name, 34)))
         for name in YUV
     ),
     Variant("color-16-bit-big-endian", "`rgb16` with `is_bigendian`", color=color(raw("rgb16", big_endian=True))),
     Variant("color-padding", "rows of `bgr8` filled up by 7 bytes", color=color(raw("bgr8", padding=7))),
     Variant("color-padding-nv12", "all rows of `nv12` filled up by 6 bytes", color=color(raw("nv12", padding=6)),
-            equal=Equal(color_db=28.0)),
+            equal=Equal(color_db=32.0)),
     Variant("color-padding-protobuf", "padding in protobuf", make=FOX, color=color(raw("rgb8", padding=5))),
     Variant("color-encoding-in-capitals", "`RGB8` with blanks around", color=color(raw("rgb8", spelled=" RGB8 "))),
     *rows(
         (
             Variant("color-odd-size-bgr8", "63x47 pixels, padded", color=color(raw("bgr8", padding=3))),
             Variant("color-odd-size-yuyv", "63x47 pixels in pairs", color=color(raw("yuyv")),
-                    equal=Equal(color_db=30.0)),
+                    equal=Equal(color_db=34.0)),
             Variant("color-odd-size-bayer", "63x47 pixels in a mosaic", color=color(raw("bayer_grbg8")),
-                    equal=Equal(color_db=26.0)),
+                    equal=Equal(color_db=27.0)),
         ),
         scene=ODD,
     ),
@@ -163,21 +163,21 @@ FILES = (
     ),
     Variant("jpeg-progressive", "progressive jpeg", equal=JPEG,
             **file(lambda rgb: jpeg(rgb, cv2.IMWRITE_JPEG_PROGRESSIVE, 1), "jpeg")),
-    Variant("jpeg-subsampled", "jpeg in 4:2:0", equal=Equal(color_db=28.0), **file(
+    Variant("jpeg-subsampled", "jpeg in 4:2:0", equal=JPEG, **file(
         lambda rgb: jpeg(rgb, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420), "jpeg")),
-    Variant("jpeg-grey", "jpeg of one channel", equal=Equal(grey=True, color_db=34.0),
+    Variant("jpeg-grey", "jpeg of one channel", equal=Equal(grey=True, color_db=44.0),
             **file(lambda rgb: jpeg(rgb[:, :, 1]), "jpeg")),
     Variant("jpeg-turned-by-tag", "jpeg with an orientation tag, which is ignored as by ROS",
-            equal=Equal(color_db=28.0),
+            equal=JPEG,
             **file(_turned_by_tag, "jpeg")),
     Variant("png", "png of 8 bits", **file(lambda rgb: encoded(".png", rgb), "rgb8; png compressed bgr8")),
     Variant("png-16-bit", "png of 16 bits a channel", **file(_png16, "png")),
     Variant("png-alpha", "png with alpha, which is dropped", **file(_png_with_alpha, "png")),
     Variant("png-grey", "png of one channel", **file(lambda rgb: encoded(".png", rgb[:, :, 1]), "png"), equal=GREY),
-    Variant("png-palette", "png with a palette of 256 colours", equal=Equal(color_db=30.0),
+    Variant("png-palette", "png with a palette of 256 colours", equal=Equal(color_db=36.0),
             **file(lambda rgb: _by_pillow(rgb, "PNG", palette=True), "png")),
     Variant("webp", "webp with loss", **file(lambda rgb: encoded(".webp", rgb, cv2.IMWRITE_WEBP_QUALITY, 95), "webp"),
-            equal=Equal(color_db=28.0)),
+            equal=Equal(color_db=33.0)),
     Variant("webp-lossless", "webp without loss",
             **file(lambda rgb: encoded(".webp", rgb, cv2.IMWRITE_WEBP_QUALITY, 101), "webp")),
     Variant("jpeg-protobuf", "jpeg in protobuf", make=FOX, equal=JPEG, **file(jpeg, "jpeg")),
