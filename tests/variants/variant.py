@@ -65,6 +65,20 @@ class Equal:
     scores: float = 0.0
     warns: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        """For the table of docs/logs.md."""
+        clock = {"same": "scores and timing", "shifted": "scores", "other": "offline scores"}[self.timing]
+        parts = [f"scores within {self.scores:g}" if self.scores else clock]
+        parts += ["map"] if self.map else []
+        parts += ["colour is grey"] if self.grey else []
+        parts += [f"colour {self.color_db:g} dB"] if self.color_db < inf else []
+        if self.depth_m:
+            share = f" for {self.depth_share:.0%}" if self.depth_share < 1 else ""
+            parts.append(f"depth within {1000 * self.depth_m:g} mm{share}")
+        parts += [f"{self.labels_share:.0%} of labels"] if self.labels_share < 1 else []
+        absent = {"depth": self.depth_m is None, "intrinsics": not self.camera, "poses": not self.pose}
+        return "; ".join([*parts, *(f"no {name}" for name, lacks in absent.items() if lacks)])
+
 
 def one_file(name: str = "log.mcap", **options: Any) -> Store:
     """A file by mcap's writer, of a few chunks."""
