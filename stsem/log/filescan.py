@@ -170,11 +170,11 @@ class FileScan:
             self._result.metadata[classtable.METADATA] = string_map(entries)
 
     def attachment(self, body: bytes, _: bool) -> None:
-        """An attachment, with its checksum over everything before it; only a class table is kept."""
+        """An attachment, with its checksum over everything before it; only a class table is kept, if it is whole."""
         (_times, name, _type, data, crc), end = split(Opcode.ATTACHMENT, body)
         if int.from_bytes(crc, "little") not in (0, zlib.crc32(body[: end - len(crc)])):
             self._damage.count("attachment_crc")
-        if name == classtable.ATTACHMENT.encode():
+        elif name == classtable.ATTACHMENT.encode():
             if len(data) > MAX_TABLE_BYTES:
                 raise ValueError(f"a class table of {len(data)} bytes")
             self._result.attachments[classtable.ATTACHMENT] = bytes(data)

@@ -9,7 +9,8 @@
 | `lost_message` | a message of a lost part, as the index behind a chunk or the statistics state | the message |
 | `unknown_channel` | a message whose channel is described nowhere | the message |
 | `undecodable` | a message that cannot be decoded | the message |
-| `data_crc`, `summary_crc`, `attachment_crc` | a section does not have its checksum | nothing |
+| `data_crc`, `summary_crc` | a section does not have its checksum | nothing |
+| `attachment_crc` | an attachment does not have its checksum | the attachment |
 | `contradiction` | an index, the statistics, a chunk's times or a repeated definition say otherwise | unknown |
 | `unread_byte` | bytes that were not understood, or that stand behind the end of the recording | unknown |
 
