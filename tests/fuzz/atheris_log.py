@@ -1,0 +1,50 @@
+"""Coverage-guided fuzzing of an entry of `entries.py` with atheris, which is not a dependency (`pip install atheris`).
+
+    python -m tests.fuzz.atheris_log log corpus/ -max_total_time=600
+    python -m tests.fuzz.atheris_log rvl corpus/ crash-1234
+
+The folder is given its first files when it does not exist; everything behind the entry goes to libFuzzer.
+"""
+
+import sys
+from pathlib import Path
+
+from tests.fuzz.entries import ENTRIES, Entry
+
+MISSING = "atheris is not installed; pip install atheris (Linux and macOS), or run python -m tests.fuzz without it."
+USAGE = f"usage: python -m tests.fuzz.atheris_log ENTRY FOLDER [libFuzzer options]; entries: {', '.join(ENTRIES)}"
+MEMORY_MB = 2048
+SECONDS = 10
+
+
+def main(arguments: list[str]) -> int:
+    """Run until a bug is found, or libFuzzer's limits are met."""
+    if len(arguments) < 2 or arguments[0] not in ENTRIES:
+        print(USAGE, file=sys.stderr)
+        return 2
+    try:
+        import atheris
+    except ImportError:
+        print(MISSING, file=sys.stderr)
+        return 1
+    name, folder, *options = arguments
+    entry = ENTRIES[name]
+    write_seeds(entry, Path(folder))
+    atheris.instrument_all()
+    limits = [f"-rss_limit_mb={MEMORY_MB}", f"-timeout={SECONDS}"]
+    atheris.Setup([sys.argv[0], folder, *limits, *options], entry)
+    atheris.Fuzz()
+    return 0
+
+
+def write_seeds(entry: Entry, folder: Path) -> None:
+    """The bytes to begin with, as files, into a folder that does not exist yet."""
+    if folder.is_dir():
+        return
+    folder.mkdir(parents=True)
+    for number, data in enumerate(entry.seeds()):
+        (folder / f"seed-{number}").write_bytes(data)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,6 @@
+"""So that worker processes, too, find these modules."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
