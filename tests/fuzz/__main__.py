@@ -40,7 +40,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seeds", nargs=2, type=int, default=(0, 10_000), metavar=("FIRST", "END"))
     parser.add_argument("--logs", nargs="+", choices=SUBJECTS, default=list(THREE))
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--keep", type=Path, default=Path("fuzz-failures"), help="folder for mutants that failed")
+    parser.add_argument("--keep", type=Path, default=Path("runs/fuzz"), help="folder for mutants that failed")
     return parser.parse_args()
 
 
