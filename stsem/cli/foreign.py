@@ -30,9 +30,10 @@ def pointing_to_convert(given: Sequence[str]) -> Iterator[None]:
 
 def _convertible(path: Path) -> str:
     """What it is, in a few words; "" when it cannot be converted."""
+    from stsem.convert.bags import is_mcap
     from stsem.convert.detect import find_format
 
     try:
-        return find_format(path, None).summary
+        return "" if is_mcap(path) else find_format(path, None).summary
     except (ConversionError, OSError, ValueError):
         return ""

@@ -7,6 +7,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import numpy as np
+
 from stsem.camera import Camera
 from stsem.classes import ClassSet, Labels
 from stsem.errors import ChannelError, DecodeError
@@ -118,7 +120,9 @@ class ScannedLog:
             assembly = assemble(scanned, store, topics or {}, classes_file, depth_registered)
             rows = window(assembly.color.rows.stamp_ns, start_s, end_s)
             assembly.warnings += left_out(paths)
-            return Log(assembly, describe(paths, scanned, assembly), store, rows)
+            info = describe(paths, scanned, assembly)
+            assembly.images = ()  # lets go of the index of channels that are not used
+            return Log(assembly, info, store, rows)
         except BaseException as err:
             store.close()
             if isinstance(err, ChannelError) and scanned.damage.lossy:
@@ -143,14 +147,14 @@ class Log:
         self._rectifier = assembly.optics.rectifier
         self._labels = assembly.labels if assembly.table else None
         self._translate = Translator(assembly.table) if assembly.table else None
-        self._unknown_pixels: dict[int, int] = {}
+        self._unknown_pixels = np.zeros(len(assembly.labels) if assembly.labels else 0, np.int32)
         self._images: Recent[int, Image] = Recent(self._decode_image, IMAGES_KEPT)
         self._truths: Recent[int, Labels | None] = Recent(self._decode_truth, IMAGES_KEPT)
         self._partners, inexact = pair_all(assembly)
         self.camera: Camera | None = assembly.optics.camera
         self.classes: ClassSet | None = assembly.table.classes if assembly.table else None
         self.period_ns: int = median_period_ns(self._color.rows) or UNKNOWN_PERIOD_NS
-        self.plans: tuple[FramePlan, ...] = plan_all(assembly, self._partners, rows)
+        self.plans: Sequence[FramePlan] = plan_all(assembly, self._partners, rows)
         if inexact:
             sentence = (
                 f"{inexact} label images have no colour image of exactly their stamp and went to the nearest one."
@@ -180,9 +184,9 @@ class Log:
     @property
     def info(self) -> LogInfo:
         """What the log is; damage and warnings include what was met while frames and truth were read."""
-        if not self._unknown_pixels:
+        frames, total = int(np.count_nonzero(self._unknown_pixels)), int(self._unknown_pixels.sum())
+        if not frames:
             return self._info
-        frames, total = len(self._unknown_pixels), sum(self._unknown_pixels.values())
         sentence = f"{total} pixels in {frames} label images have an id or colour outside the class table: ignored."
         return replace(self._info, warnings=(*self._info.warnings, Remark("truth-unknown-ids", sentence)))
 
@@ -249,8 +253,7 @@ class Log:
             labels, unknown = self._labels.read(row, convert)
         except DecodeError:
             return None
-        if unknown:
-            self._unknown_pixels[row] = unknown
+        self._unknown_pixels[row] = unknown
         return labels
 
     def _previous(self, row: int) -> Image | None:
