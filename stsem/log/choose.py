@@ -155,7 +155,7 @@ def choose_partner(images: Iterable[Candidate], nature: str, color: Candidate) -
     """
     found = sorted((c for c in images if c.nature == nature and c.track.count), key=lambda c: c.topic)
     if not found:
-        return None, ""
+        return None, _no_depth(images) if nature == "depth" else ""
 
     def nearness(c: Candidate) -> tuple[int, ...]:
         same_frame = bool(c.look.frame_id) and c.look.frame_id == color.look.frame_id
@@ -167,6 +167,16 @@ def choose_partner(images: Iterable[Candidate], nature: str, color: Candidate) -
         return (same_frame, bool(c.words & ALIGNED_WORDS), *place)
 
     return _best(found, nearness, nature)
+
+
+def _no_depth(images: Iterable[Candidate]) -> str:
+    """A remark when a topic says depth and its pixels cannot be: jpeg, 8 bits, colours; "" otherwise."""
+    spoilt = (c for c in images if topicnames.told(c.topic) == "depth" and not c.words & DULL_WORDS)
+    for c in sorted(spoilt, key=lambda c: c.topic):
+        if c.look.order in ("rgb", "bgr", "grey", "spoilt"):
+            needed = "depth needs 16 bits or floats of one channel, and is not used"
+            return Remark("depth-undecodable", f"{c.topic} says depth, but holds {c.look.name}: {needed}.")
+    return ""
 
 
 def _best(

@@ -26,6 +26,7 @@ from tape import (
 )
 from variant import Variant
 
+NO_DEPTH = ": depth needs 16 bits or floats of one channel, and is not used."
 VIDEO = b"\0\0\0\1\x67" + bytes(40)
 
 
@@ -142,14 +143,15 @@ REFUSALS = (
     Refusal(
         Variant("refused-jpeg-depth", "depth in jpeg or webp, whose 8 bits cannot hold it",
                 depth=depth(_stills(_spoilt_depth, "16UC1; jpeg compressed"), f"{DEPTH}/compressed")),
-        "depth", kind="unused",
+        f"{DEPTH}/compressed says depth, but holds 16UC1; jpeg compressed (jpeg has 8 bits){NO_DEPTH}", kind="warning",
     ),
     Refusal(
         Variant("refused-8-bit-depth", "depth in a png of 8 bits", depth=depth(
             _stills(lambda view: encoded(".png", (view.mm >> 8).astype(np.uint8)), "png"), f"{DEPTH}/compressed")),
-        "depth", kind="unused",
+        f"{DEPTH}/compressed says depth, but holds png{NO_DEPTH}", kind="warning",
     ),
     Refusal(
-        Variant("refused-painted-depth", "depth painted in colours", depth=depth(rgb8)), "depth", kind="unused",
+        Variant("refused-painted-depth", "depth painted in colours", depth=depth(rgb8)),
+        f"{DEPTH} says depth, but holds rgb8{NO_DEPTH}", kind="warning",
     ),
 )  # fmt: skip
