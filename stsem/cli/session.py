@@ -11,6 +11,7 @@ from pathlib import Path
 
 from stsem import hostclock
 from stsem.cli.console import note, progress
+from stsem.cli.foreign import pointing_to_convert
 from stsem.cli.inputs import annotate_map, report_inputs
 from stsem.document.canonical import to_bytes
 from stsem.document.difference import first_differences, repeatable_files
@@ -100,7 +101,7 @@ def _replay_one(paths: tuple[str, ...], config: RunConfig, out: Path | None) -> 
     check_target(out or REPORTS / name / "report")
     if len(paths) > 1:
         note(f"Reading {', '.join(map(shown_name, paths))} as one recording in parts.")
-    with progress(f"Reading {name}") as step:
+    with progress(f"Reading {name}") as step, pointing_to_convert(paths):
         log = open_log(
             paths,
             topics={str(role): topic for role, topic in config.topic.items()},

@@ -191,3 +191,8 @@ def test_a_damaged_log_is_inspected_as_far_as_it_goes(cli: Cli, home: Path) -> N
     ran = cli("inspect", path)
     assert ran.code == 3
     assert " 1. damage: The log is damaged: truncated 1" in ran.out
+
+
+def test_the_replay_says_so_too(cli: Cli, home: Path) -> None:
+    (home / "drive.bag").write_bytes(b"#ROSBAG V2.0\n" + bytes(100))
+    assert cli("replay", "drive.bag").sentence.endswith("stsem convert drive.bag")
