@@ -1,10 +1,11 @@
 """Calibration: sensors that were binned, cropped, scaled or rectified, and lenses that bend."""
 
 from dataclasses import replace
+from typing import Any
 
 from analytic_scene import CAMERA, Scene
 from family_rows import FOX
-from tape import COLOR, INFO, Message, Tape, calibration, color, depth, nothing, rgb8
+from tape import COLOR, INFO, Message, Part, Tape, calibration, color, depth, nothing, rgb8
 from variant import Equal, Variant
 
 from stsem.camera import Camera
@@ -27,10 +28,10 @@ def k(camera: Camera) -> list[float]:
     return camera.K.ravel().tolist()
 
 
-def once(late_ns: int) -> object:
+def once(late_ns: int) -> Part:
     """One calibration for the whole log, so long after the first image."""
 
-    def part(make: object, scene: Scene) -> Tape:
+    def part(make: Any, scene: Scene) -> Tape:
         (first, *_) = calibration()(make, scene).messages
         return Tape((Message(INFO, first.content, scene.start_ns + late_ns),))
 

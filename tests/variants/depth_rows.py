@@ -30,7 +30,7 @@ from tape import (
 from variant import Equal, Variant
 
 from stsem.camera import Camera
-from stsem.pose import Pose, from_quaternion
+from stsem.pose import Pose
 from tests.made_up_lens import RIG
 
 Array = np.ndarray[Any, Any]
@@ -146,7 +146,6 @@ def _in_frame(frame_id: str) -> Part:
 
 
 PROJECTED = Equal(depth_m=0.03, depth_share=0.85, map=False, warns=(DEPTH,))
-NEARLY = from_quaternion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 UNREGISTERED = (
     Variant("depth-stamps-apart", "depth stamps 5 ms behind those of colour: the nearest within 20 ms",
             depth=_late(5_000_000)),

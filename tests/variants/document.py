@@ -1,6 +1,6 @@
 """The tables of docs/logs.md, as the table of variants and that of refusals want them.
 
-python tests/variants/document.py prints them.
+`PYTHONPATH=.:tests/log python tests/variants/document.py` prints them.
 """
 
 from collections.abc import Iterable

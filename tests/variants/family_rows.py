@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import cv2
-import numpy as np
 from encoders_foxglove import Fox, Json
 from encoders_ros import Encoded, RosMessages
 from image_messages import encoded
@@ -35,10 +33,6 @@ def respelled(respell: Callable[[Encoded], Encoded]) -> Callable[[Tape], Tape]:
 def _dds(content: Encoded) -> Encoded:
     package, _, name = content.schema.split("/")
     return replace(content, schema=f"{package}::msg::dds_::{name}_", schema_encoding="ros2idl", definition=b"")
-
-
-def _upside_down(image: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(cv2.flip(image, 0))
 
 
 FAMILIES = (

@@ -29,7 +29,6 @@ MOUNT = from_quaternion((0.11, -0.02, 0.31), (0.02, 0.05, -0.1, 1.0))
 """T_base_mount, somewhere on the way to the camera."""
 BODY_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 WAIST = link("base", FRAME, BASE_CAMERA)
-LONG = Equal(warns=("10 transforms",))
 NOWHERE = float("nan")
 
 

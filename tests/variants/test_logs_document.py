@@ -30,7 +30,7 @@ def written() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("heading", tables())
 def test_the_document_has_the_table_of_variants(heading: str) -> None:
-    """`python tests/variants/document.py` prints the tables."""
+    """`document.py` prints the tables as they should be."""
     assert written()[heading] == tables()[heading]
 
 
