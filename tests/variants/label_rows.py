@@ -161,4 +161,3 @@ CLASS_TABLES = (
     Variant("classes-twice", "two tables that agree, one with colours",
             classes=lambda make, scene: class_names(make, scene) + IN_COLOUR(make, scene)),
 )  # fmt: skip
-LABEL_ROWS = (*LABELS_ENCODED, *CLASS_TABLES)
