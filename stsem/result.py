@@ -1,9 +1,12 @@
 """What became of a frame: its outcome, and the spans of core time spent on it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from struct import Struct
 
 from stsem.classes import Labels
+from stsem.packed import Codes, Packed, packed_time, unpacked_time
 
 STAGES: tuple[str, ...] = ("decode", "register", "segment", "propagate", "fuse")
 """Every stage that can hold a core, in pipeline order: among jobs of one frame the earlier stage goes first, and
@@ -80,3 +83,52 @@ class FrameResult:
     coverage: float | None = None
     spans: tuple[Span, ...] = field(default=())
     labels: Labels | None = None
+
+
+class Spans(Packed[Span]):
+    """Jobs in 31 bytes each."""
+
+    layout = Struct("<ibhqqq")
+
+    def __init__(self, items: Iterable[Span] = ()) -> None:
+        self._stages: Codes[str] = Codes()
+        self._cores: Codes[tuple[int, ...]] = Codes()
+        super().__init__(items)
+
+    def _pack(self, item: Span) -> tuple[int, ...]:
+        stage, cores = self._stages.code(item.stage), self._cores.code(item.cores)
+        return item.frame, stage, cores, item.ready_ns, item.start_ns, item.end_ns
+
+    def _unpack(self, frame: int, stage: int, cores: int, *times_ns: int) -> Span:
+        return Span(frame, self._stages.value(stage), self._cores.value(cores), *times_ns)
+
+
+_OUTCOMES = tuple(Outcome)
+
+
+class Results(Packed[FrameResult]):
+    """What became of frames, without spans and labels, in 53 bytes each."""
+
+    layout = Struct("<iqqqqbiid")
+
+    def __init__(self, items: Iterable[FrameResult] = ()) -> None:
+        self._reasons: Codes[str] = Codes()
+        super().__init__(items)
+
+    def _pack(self, item: FrameResult) -> tuple[float, ...]:
+        return (
+            item.index, item.stamp_ns, packed_time(item.arrival_ns), packed_time(item.taken_ns),
+            packed_time(item.answered_ns), _OUTCOMES.index(item.outcome),
+            -1 if item.keyframe is None else item.keyframe, self._reasons.code(item.reason),
+            -1.0 if item.coverage is None else item.coverage,
+        )  # fmt: skip
+
+    def _unpack(
+        self, index: int, stamp_ns: int, arrival_ns: int, taken_ns: int, answered_ns: int, outcome: int,
+        keyframe: int, reason: int, coverage: float,
+    ) -> FrameResult:  # fmt: skip
+        return FrameResult(
+            index, stamp_ns, unpacked_time(arrival_ns), unpacked_time(taken_ns), unpacked_time(answered_ns),
+            _OUTCOMES[outcome], None if keyframe < 0 else keyframe, self._reasons.value(reason),
+            None if coverage < 0 else coverage,
+        )  # fmt: skip

@@ -182,7 +182,7 @@ def _check_repeats(session: Session, first: Path, number: int) -> None:
 
 def _host(session: Session, context: Context, began: Began) -> Host:
     replayed = context.replayed
-    inside = sum(sum(times) for times in replayed.stage_times_ns.values())
+    inside = sum(time.total_ns for time in replayed.stage_times.values())
     return Host(
         paths={"log": _shown(map(str, session.log.info.sources), ", "), "model": session.config.model,
                "costs": session.config.costs},
@@ -192,8 +192,8 @@ def _host(session: Session, context: Context, began: Began) -> Host:
         wall_s=(hostclock.wall_ns() - began.wall_ns) / 1e9,
         cpu_s=(hostclock.process_cpu_ns() - began.cpu_ns) / 1e9,
         stages={
-            stage: StageCost(mean_ms=sum(times) / len(times) / 1e6, max_ms=max(times) / 1e6, n=len(times))
-            for stage, times in sorted(replayed.stage_times_ns.items())
+            stage: StageCost(mean_ms=time.total_ns / time.n / 1e6, max_ms=time.max_ns / 1e6, n=time.n)
+            for stage, time in sorted(replayed.stage_times.items())
         },
         overhead_ms=(replayed.wall_ns - inside) / max(1, len(replayed.slots)) / 1e6,
         peak_memory_bytes=hostclock.peak_memory_bytes(),

@@ -3,7 +3,8 @@
 import numpy as np
 
 from stsem.log.assemble import Assembly
-from stsem.log.plan import FramePlan, Partners, make_plans, pair_depth, pair_truth
+from stsem.log.plan import Partners, pair_depth, pair_truth
+from stsem.log.plans import FramePlans, make_plans
 
 
 def pair_all(assembly: Assembly) -> tuple[Partners, int]:
@@ -17,7 +18,7 @@ def pair_all(assembly: Assembly) -> tuple[Partners, int]:
     return Partners(depth, truth), inexact
 
 
-def plan_all(assembly: Assembly, partners: Partners, rows: slice) -> tuple[FramePlan, ...]:
+def plan_all(assembly: Assembly, partners: Partners, rows: slice) -> FramePlans:
     """Plans of the colour frames `rows`, with the clock offsets taken out of their log times."""
     channels, offset = (assembly.color, assembly.depth, assembly.labels), assembly.clock_offsets_ns
     topics = [c.topic if c else None for c in channels] + [assembly.pose_topic]

@@ -1,12 +1,10 @@
 """Which messages make up a frame, and when it arrives: told by stamps and log times, before any pixel is decoded."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from stsem.errors import UsageError
-from stsem.log.poses.source import PoseSource
 from stsem.log.tracks import Int64, References
 
 MAX_DEPTH_OFFSET_NS = 20_000_000
@@ -133,32 +131,3 @@ def window(stamps_ns: Int64, start_s: float | None, end_s: float | None) -> slic
             f"the log's colour frames go from 0 to {length:.3f} s."
         )
     return slice(low, high)
-
-
-def make_plans(
-    color: References, depth: References | None, truth: References | None, partners: Partners,
-    poses: PoseSource | None, rows: slice, offsets: Sequence[int],
-) -> tuple[FramePlan, ...]:  # fmt: skip
-    """Plans of the colour frames `rows`; `offsets` are the clock offsets of colour, depth, pose and labels."""
-    color_offset, depth_offset, pose_offset, truth_offset = offsets
-    stamps = color.stamp_ns[rows]
-    times = poses.times(stamps) if poses else None
-    posed = times.known.tolist() if times else [False] * len(stamps)
-    pose_logs = (times.log_ns - pose_offset).tolist() if times else stamps.tolist()
-    columns = zip(
-        stamps.tolist(), (color.log_ns[rows] - color_offset).tolist(),
-        _logs(depth, partners.depth[rows], depth_offset), _logs(truth, partners.truth[rows], truth_offset),
-        posed, pose_logs, strict=True,
-    )  # fmt: skip
-    return tuple(
-        FramePlan(index, stamp_ns, color_log, depth_log, pose_log if has_pose else None, truth_log)
-        for index, (stamp_ns, color_log, depth_log, truth_log, has_pose, pose_log) in enumerate(columns)
-    )
-
-
-def _logs(references: References | None, rows: Int64, offset_ns: int) -> list[int | None]:
-    """Log times of the partners in `rows`; None for row -1."""
-    if references is None or not len(references):
-        return [None] * len(rows)
-    times = references.log_ns[rows] - offset_ns
-    return [time if row >= 0 else None for row, time in zip(rows.tolist(), times.tolist(), strict=True)]

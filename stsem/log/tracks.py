@@ -60,7 +60,7 @@ class Samples:
     def arrays(self) -> tuple[Int64, Int64, Float64, Float64]:
         """(stamps (n,), log times (n,), translations (n, 3), quaternions (n, 4) x y z w)."""
         times = _as_int64(self._times).reshape(-1, 2)
-        values = np.array(self._values, np.float64).reshape(-1, 7)
+        values = np.asarray(self._values, np.float64).reshape(-1, 7)
         return times[:, 0], times[:, 1], values[:, :3], values[:, 3:]
 
 
@@ -167,12 +167,14 @@ class Track:
         return plausible(message.stamp_ns)
 
     def references(self) -> References:
-        """Where the images are, in order; other messages have been read and are not looked up again."""
+        """Where the images are, in order, once all have come in; other messages are not looked up again."""
         if self.kind not in IMAGES:
             return References(*(np.zeros(0, np.int64) for _ in range(5)))
-        stamp, log, place, offset, length = (_as_int64(column) for column in (*self._times, *self._where))
+        columns = stamp, log, place, offset, _ = [_as_int64(column) for column in (*self._times, *self._where)]
         order = np.lexsort((offset, place, log, stamp))
-        return References(stamp[order], log[order], place[order], offset[order], length[order])
+        if (np.diff(order) == 1).all():  # as they were recorded: nothing is copied
+            return References(*columns)
+        return References(*(column[order] for column in columns))
 
     @property
     def duplicates(self) -> int:
@@ -197,4 +199,5 @@ def _append(columns: "Sequence[array[int]]", values: Sequence[int]) -> None:
 
 
 def _as_int64(column: "array[int]") -> Int64:
-    return np.array(column, np.int64)
+    """A view: while it lives, the column cannot grow."""
+    return np.asarray(column, np.int64)

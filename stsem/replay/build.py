@@ -89,14 +89,18 @@ def truth_frames(log: Log) -> frozenset[int]:
     return frozenset(plan.index for plan in log.plans if plan.has_truth)
 
 
+def _has_truth(log: Log) -> bool:
+    return any(plan.has_truth for plan in log.plans)
+
+
 def _oracle(log: Log) -> Model:
-    if log.classes is None or not truth_frames(log):
+    if log.classes is None or not _has_truth(log):
         raise ClassTableError(
             f"The oracle needs truth, but {log.info.name} has "
             f"{'no label channel' if log.info.choice.labels is None else 'no class table or no labelled frame'}; "
             "choose a network with --model."
         )
-    segmenter = OracleSegmenter(truth_frames(log).__contains__, log.truth)
+    segmenter = OracleSegmenter(lambda index: log.plans[index].has_truth, log.truth)
     return Model("oracle", None, log.classes, None, "", lambda threads, times: Memo(segmenter))
 
 
@@ -107,7 +111,7 @@ def _meeting(network: ClassSet, log: Log, config: RunConfig) -> tuple[ClassSet, 
         return network, own, "the log has no label channel"
     if log.classes is None:
         return network, own, "the labels of the log have no class table; give one with --classes"
-    if not truth_frames(log):
+    if not _has_truth(log):
         return network, own, "no frame in the window has truth"
     table = translation(network, log.classes, _class_map(config.class_map))
     if (table[: len(network)] == NO_LABEL).all():

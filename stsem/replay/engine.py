@@ -1,6 +1,6 @@
 """One pass over a log drives every run of every mode: each frame is read, decoded and segmented once."""
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +13,7 @@ from stsem.log.log import Loaded, Log
 from stsem.log.plan import NEEDS
 from stsem.replay.build import NETWORK_THREADS, Model
 from stsem.replay.config import RunConfig
-from stsem.replay.hosttimes import StageTimes
+from stsem.replay.hosttimes import StageTime, StageTimes
 from stsem.replay.lanes import CostsOf, Lane, ModeRun, Setup
 from stsem.replay.modes import Mode
 from stsem.replay.schedule import Slot, horizon_ns, schedule
@@ -43,14 +43,14 @@ class Replayed:
         slots: every frame on the simulated clock.
         runs: one per mode.
         pictures: a few frames.
-        stage_times_ns: stage -> wall-clock durations on this host.
+        stage_times: stage -> what it cost on this host.
         wall_ns: wall-clock duration of the pass.
     """
 
-    slots: tuple[Slot, ...]
+    slots: Sequence[Slot]
     runs: tuple[ModeRun, ...]
     pictures: tuple[Picture, ...]
-    stage_times_ns: Mapping[str, list[int]]
+    stage_times: Mapping[str, StageTime]
     wall_ns: int
 
 
@@ -94,7 +94,7 @@ def replay_log(
     pictures = _feed(frames_at, setup, lanes, progress)
     end = horizon_ns(slots, log.period_ns, config.exact_rate)
     runs = tuple(lane.finish(end) for lane in lanes)
-    return Replayed(slots, runs, pictures, times.durations_ns, hostclock.wall_ns() - began)
+    return Replayed(slots, runs, pictures, times.stages, hostclock.wall_ns() - began)
 
 
 def can_map(log: Log, config: RunConfig) -> bool:
@@ -104,27 +104,27 @@ def can_map(log: Log, config: RunConfig) -> bool:
     return config.map and choice.depth is not None and choice.pose is not None and straight
 
 
-def _frames(log: Log, model: Model, fused: bool, indices: list[int]) -> Generator[Loaded, None, None]:
+def _frames(log: Log, model: Model, fused: bool, indices: Iterable[int]) -> Generator[Loaded, None, None]:
     """The frames at `indices` with what this replay looks at."""
     previous = model.network is not None and model.network.has_difference
     return log.frames(indices, depth=fused, previous=previous, truth=not model.reason)
 
 
 def _feed(
-    frames_at: Callable[[list[int]], Generator[Loaded, None, None]],
+    frames_at: Callable[[Iterable[int]], Generator[Loaded, None, None]],
     setup: Setup,
     lanes: list[Lane],
     progress: Callable[[int, int], None],
 ) -> tuple[Picture, ...]:
     """Every frame of the log into every lane."""
-    pictures, indices = [], [slot.index for slot in setup.slots]
-    with closing(frames_at(indices)) as frames:
+    pictures = []
+    with closing(frames_at(slot.index for slot in setup.slots)) as frames:
         for done, loaded in enumerate(frames, start=1):
             if loaded.index in setup.pictured and loaded.frame is not None:
                 pictures.append(Picture(loaded.index, loaded.frame.image, loaded.truth))
             for lane in lanes:
                 lane.push(loaded)
-            progress(done, len(indices))
+            progress(done, len(setup.slots))
     return tuple(pictures)
 
 
@@ -132,7 +132,7 @@ def _watch_of(mode: Mode, watch: WatchMode | None) -> Callable[[FrameResult, Fra
     return None if watch is None else lambda result, frame: watch(mode, result, frame)
 
 
-def _pictured(slots: tuple[Slot, ...]) -> frozenset[int]:
+def _pictured(slots: Sequence[Slot]) -> frozenset[int]:
     """Evenly spread over the frames with truth, or over all when none has."""
     choice = [slot.index for slot in slots if slot.has_truth] or [slot.index for slot in slots]
     count = min(PICTURES, len(choice))

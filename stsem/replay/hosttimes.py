@@ -19,20 +19,35 @@ T = TypeVar("T")
 
 
 @dataclass
+class StageTime:
+    """Wall-clock durations of one stage: how many, their sum, the longest."""
+
+    n: int = 0
+    total_ns: int = 0
+    max_ns: int = 0
+
+    def add(self, duration_ns: int) -> None:
+        """Take in one duration."""
+        self.n += 1
+        self.total_ns += duration_ns
+        self.max_ns = max(self.max_ns, duration_ns)
+
+
+@dataclass
 class StageTimes:
     """Wall-clock durations by stage.
 
     Attributes:
-        durations_ns: stage -> every duration.
+        stages: stage -> its durations.
     """
 
-    durations_ns: dict[str, list[int]] = field(default_factory=dict)
+    stages: dict[str, StageTime] = field(default_factory=dict)
 
     def measure(self, stage: str, work: Callable[[], T]) -> T:
         """Do `work` and note how long it took."""
         before = hostclock.wall_ns()
         result = work()
-        self.durations_ns.setdefault(stage, []).append(hostclock.wall_ns() - before)
+        self.stages.setdefault(stage, StageTime()).add(hostclock.wall_ns() - before)
         return result
 
 

@@ -1,6 +1,6 @@
 """The runs of one mode, with a clock and without, fed with the same frames."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from stsem.log.log import Loaded
@@ -41,7 +41,7 @@ class ModeRun:
     real_time: Record | None = None
     offline: Record | None = None
     rule: AnswerRule | None = None
-    spans: tuple[Span, ...] = ()
+    spans: Sequence[Span] = ()
 
     @property
     def record(self) -> Record:
@@ -72,7 +72,7 @@ class Setup:
     model: Model
     segmenter: Segmenter
     costs_of: CostsOf | None
-    slots: tuple[Slot, ...]
+    slots: Sequence[Slot]
     pictured: frozenset[int]
     fused: bool
     times: StageTimes = field(default_factory=StageTimes)

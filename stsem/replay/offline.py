@@ -1,5 +1,7 @@
 """One mode without a clock: every frame in order, which is what papers measure (DESIGN 3, `--clock offline`)."""
 
+from collections.abc import Sequence
+
 from stsem.classes import Labels
 from stsem.frame import Frame, Segmentation
 from stsem.log.log import Loaded
@@ -22,7 +24,7 @@ class OfflineRun:
     """
 
     def __init__(
-        self, slots: tuple[Slot, ...], rule: AnswerRule, judge: Judge, *, fuse: Fuser | None, only_truth: bool
+        self, slots: Sequence[Slot], rule: AnswerRule, judge: Judge, *, fuse: Fuser | None, only_truth: bool
     ) -> None:
         self._slots, self._rule, self._judge, self._fuse = slots, rule, judge, fuse
         self._only_truth = only_truth

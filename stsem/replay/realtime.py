@@ -1,6 +1,6 @@
 """One mode on the simulated clock: frames arrive, wait, are taken, answered, or end otherwise (DESIGN 3)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -102,7 +102,7 @@ class RealTimeRun:
         judge: told of arrivals and ends.
     """
 
-    def __init__(self, slots: tuple[Slot, ...], rule: AnswerRule, machine: Machine, judge: Judge) -> None:
+    def __init__(self, slots: Sequence[Slot], rule: AnswerRule, machine: Machine, judge: Judge) -> None:
         self._slots, self._rule, self._machine, self._judge = slots, rule, machine, judge
         self._marks = watermarks(slots)
         self._queue = EventQueue(min((slot.arrival_ns for slot in slots), default=0))
@@ -111,7 +111,7 @@ class RealTimeRun:
         self._state = _State(WaitingRoom(machine.reload))
 
     @property
-    def spans(self) -> tuple[Span, ...]:
+    def spans(self) -> Sequence[Span]:
         """Every job, in order of start."""
         return self._pool.spans
 

@@ -1,6 +1,6 @@
 """What is kept of a run: every frame's result without its pixels, the judgement, and a few frames to look at."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from stsem.metrics.consistency import ConsistencyMeter
 from stsem.metrics.scorecard import Scorecard
 from stsem.replay.realtime import NewestAnswer
 from stsem.replay.schedule import Slot
-from stsem.result import FrameResult, Outcome
+from stsem.result import FrameResult, Outcome, Results
 
 Watch = Callable[[FrameResult, Frame], None]
 """Called with the result of an answered frame, labels included, and the frame."""
@@ -31,7 +31,7 @@ class Record:
 
     def __init__(
         self,
-        slots: tuple[Slot, ...],
+        slots: Sequence[Slot],
         scorecard: Scorecard | None,
         watched: frozenset[int],
         classes: ClassSet | None = None,
@@ -41,7 +41,7 @@ class Record:
         self.scorecard = scorecard
         self.consistency = None if classes is None else ConsistencyMeter(len(classes))
         self._watch = watch
-        self.results: list[FrameResult] = []
+        self.results = Results()
         self.answers: dict[int, Labels] = {}
 
     def arrived(self, slot: Slot, loaded: Loaded, newest: NewestAnswer | None) -> None:
@@ -63,7 +63,7 @@ class Record:
             self._judge(self.scorecard, result, loaded.truth)
         if result.labels is not None:
             self._look(result, loaded, result.labels)
-        self.results.append(replace(result, labels=None))
+        self.results.append(result)
 
     def _look(self, result: FrameResult, loaded: Loaded, labels: Labels) -> None:
         if result.index in self._watched:

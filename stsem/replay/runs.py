@@ -162,7 +162,7 @@ def _disabled(context: Context, run: ModeRun, record: Record) -> dict[str, int]:
     """Keyframes that `fuse` could not use, because an optional channel is missing for them."""
     if run.cloud is None:
         return {}
-    plans = {plan.index: plan for plan in context.log.plans}
+    plans = context.log.plans
     lacking = sum(bool(plans[r.index].missing(NEEDS)) for r in record.results if r.outcome is Outcome.SEGMENTED)
     return {"fuse": lacking} if lacking else {}
 

@@ -1,10 +1,13 @@
 """When each frame arrives on the simulated clock."""
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from struct import Struct
 
 from stsem.log.plan import FramePlan
+from stsem.packed import Codes, Packed
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +31,26 @@ class Slot:
     has_truth: bool
 
 
-def schedule(
-    plans: Sequence[FramePlan], rate: Fraction, required: frozenset[str], optional: frozenset[str]
-) -> tuple[Slot, ...]:
+class Slots(Packed[Slot]):
+    """The frames of a log on the simulated clock, in 30 bytes each."""
+
+    layout = Struct("<iqqqb?")
+
+    def __init__(self) -> None:
+        self._missing: Codes[tuple[str, ...]] = Codes()
+        super().__init__()
+
+    def _pack(self, item: Slot) -> tuple[int, ...]:
+        missing = self._missing.code(item.missing)
+        return item.index, item.log_stamp_ns, item.stamp_ns, item.arrival_ns, missing, item.has_truth
+
+    def _unpack(
+        self, index: int, log_stamp_ns: int, stamp_ns: int, arrival_ns: int, missing: int, has_truth: bool
+    ) -> Slot:
+        return Slot(index, log_stamp_ns, stamp_ns, arrival_ns, self._missing.value(missing), has_truth)
+
+
+def schedule(plans: Sequence[FramePlan], rate: Fraction, required: frozenset[str], optional: frozenset[str]) -> Slots:
     """DESIGN 3: sim_stamp = floor((stamp - stamp_0) / r), sim_arrival = sim_stamp + (arrival - stamp).
 
     Args:
@@ -39,21 +59,21 @@ def schedule(
         required: roles (`depth`, `pose`) without which a frame is incomplete.
         optional: roles that are waited for where they exist.
     """
+    slots = Slots()
     if not plans:
-        return ()
+        return slots
     first = plans[0].stamp_ns
     needs = required | optional
-    slots = []
     for plan in plans:
         stamp = (plan.stamp_ns - first) * rate.denominator // rate.numerator
         arrival = stamp + plan.arrival_ns(needs) - plan.stamp_ns
         slots.append(Slot(plan.index, plan.stamp_ns, stamp, arrival, plan.missing(required), plan.has_truth))
-    return tuple(slots)
+    return slots
 
 
-def watermarks(slots: Sequence[Slot]) -> list[int]:
+def watermarks(slots: Sequence[Slot]) -> Sequence[int]:
     """For each position: the earliest arrival among the later frames; one past everything for the last."""
-    marks = [0] * len(slots)
+    marks = array("q", bytes(8 * len(slots)))
     earliest = max((slot.arrival_ns for slot in slots), default=0) + 1
     for i in range(len(slots) - 1, -1, -1):
         marks[i] = earliest

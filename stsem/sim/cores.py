@@ -1,13 +1,13 @@
 """The robot's cores: jobs wait, start, hold their cores for their cost, and only then show their result."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from heapq import heappop, heappush
 from typing import Any, Generic, TypeVar
 
 from stsem.errors import UsageError
-from stsem.result import Span
+from stsem.result import Span, Spans
 from stsem.sim.events import EventQueue, Priority
 
 T = TypeVar("T")
@@ -66,7 +66,7 @@ class CorePool:
         self._cores = cores
         self._free = list(range(cores))
         self._ready: list[_Ready] = []
-        self._spans: list[Span] = []
+        self._spans = Spans()
         self._sequence = 0
         self._start_is_due = False
 
@@ -76,9 +76,9 @@ class CorePool:
         return self._cores
 
     @property
-    def spans(self) -> tuple[Span, ...]:
-        """Every job started so far, in order of start; `end_ns` may still lie ahead."""
-        return tuple(self._spans)
+    def spans(self) -> Sequence[Span]:
+        """Every job started so far, in order of start, and further ones as they start; `end_ns` may lie ahead."""
+        return self._spans
 
     @property
     def running(self) -> tuple[Span, ...]:

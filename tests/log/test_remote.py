@@ -62,7 +62,7 @@ def answers(paths: list[Any]) -> list[Any]:
             (f.frame.image.tobytes() if f.frame else None, None if f.truth is None else f.truth.tobytes())
             for f in frames
         ]
-        return [log.info.sha256, log.info.size_bytes, log.plans, seen]
+        return [log.info.sha256, log.info.size_bytes, log.plans[:], seen]
 
 
 @pytest.mark.usefixtures("small_blocks")

@@ -30,7 +30,7 @@ def schedule(requests: list[Request], cores: int = 2) -> tuple[Span, ...]:
     for ready, frame, stage, order, claimed, cost in requests:
         queue.schedule(ready, Priority.ARRIVAL, partial(pool.submit, job(frame, stage, order, claimed, cost)))
     queue.run()
-    return pool.spans
+    return tuple(pool.spans)
 
 
 def test_jobs_of_one_instant_start_oldest_frame_first_then_in_pipeline_order() -> None:
