@@ -41,6 +41,11 @@ class ClassTable:
     ignored: tuple[int, ...]
     source: str
 
+    @property
+    def colour_of(self) -> dict[int, Colour]:
+        """Raw id -> colour; empty without colours."""
+        return dict(zip(self.raw_ids, self.classes.colours, strict=False))
+
 
 class Translator:
     """Label images as they stand in the log to labels in the ids of `table.classes`."""

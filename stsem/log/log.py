@@ -147,6 +147,7 @@ class Log:
         self._rectifier = assembly.optics.rectifier
         self._labels = assembly.labels if assembly.table else None
         self._translate = Translator(assembly.table) if assembly.table else None
+        self._colour_of = assembly.table.colour_of if assembly.table else {}
         self._unknown_pixels = np.zeros(len(assembly.labels) if assembly.labels else 0, np.int32)
         self._images: Recent[int, Image] = Recent(self._decode_image, IMAGES_KEPT)
         self._truths: Recent[int, Labels | None] = Recent(self._decode_truth, IMAGES_KEPT)
@@ -243,7 +244,7 @@ class Log:
     def _decode_truth(self, row: int) -> Labels | None:
         if self._labels is None or self._translate is None:
             return None
-        translate, colours = self._translate, self.classes.colours if self.classes else ()
+        translate, colours = self._translate, self._colour_of
 
         def convert(message: ImageMessage) -> tuple[Labels, int]:
             labels, unknown = translate(decode.labels(message, colours))

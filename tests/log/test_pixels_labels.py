@@ -15,6 +15,7 @@ from stsem.log.schemas.messages import CompressedImage, RawImage
 
 IDS = np.random.default_rng(4).integers(0, 4, (12, 17), np.uint8)
 COLOURS = ((10, 20, 30), (40, 50, 60), (255, 0, 1), (0, 99, 0))
+BY_ID = dict(enumerate(COLOURS))
 TABLE = parse({name: "#{:02x}{:02x}{:02x}".format(*rgb) for name, rgb in zip("abcd", COLOURS, strict=True)}, "test")
 
 
@@ -68,7 +69,7 @@ EVERY_WAY = {
 
 @pytest.mark.parametrize("way", EVERY_WAY)
 def test_every_way_gives_the_same_labels(way: str) -> None:
-    labels, unknown = Translator(TABLE)(decode.labels(EVERY_WAY[way], TABLE.classes.colours))
+    labels, unknown = Translator(TABLE)(decode.labels(EVERY_WAY[way], TABLE.colour_of))
     np.testing.assert_array_equal(labels, IDS)
     assert unknown == 0
 
@@ -94,15 +95,17 @@ def test_what_16_bits_cannot_hold_is_an_unknown_id() -> None:
 def test_a_palette_counts_by_the_entries_in_use() -> None:
     ids = np.array([[0, 1], [1, 0]], np.uint8)
     spare = compressed(palette_png(ids, [*colour_bytes(3, 1), 1, 2, 3]))
-    assert decode.labels(spare, COLOURS).tolist() == np.array(COLOURS)[[[3, 1], [1, 3]]].tolist()
-    other = compressed(palette_png(ids, [*colour_bytes(3), 1, 2, 3]))
-    assert decode.labels(other, COLOURS).tolist() == ids.tolist()
+    assert decode.labels(spare, BY_ID).tolist() == np.array(COLOURS)[[[3, 1], [1, 3]]].tolist()
+    unlabelled = compressed(palette_png(ids, [*colour_bytes(3), 1, 2, 3]))
+    assert decode.labels(unlabelled, BY_ID).tolist() == [[list(COLOURS[3]), [1, 2, 3]], [[1, 2, 3], list(COLOURS[3])]]
+    void = compressed(palette_png(np.where(ids, 200, 0).astype(np.uint8), [*colour_bytes(0), *[1, 2, 3] * 255]))
+    assert decode.labels(void, BY_ID).tolist() == [[0, 200], [200, 0]]
     assert decode.labels(spare).tolist() == ids.tolist()
 
 
 def test_a_palette_that_is_too_short() -> None:
     data = written_png((2, 1), 8, 3, b"\0\0\5", before=png_chunk(b"PLTE", bytes(COLOURS[0])))
-    assert decode.labels(compressed(data), COLOURS).tolist() == [[0, 5]]
+    assert decode.labels(compressed(data), BY_ID).tolist() == [[0, 5]]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ All functions raise ValueError with a sentence's middle ("encoding yuv9 is not s
 topic and the stamp. Sizes are read and checked before anything is decoded.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,8 @@ from stsem.log.pixels.raw import encoding_of, native, raw_colour, samples
 from stsem.log.pixels.sizes import Size
 from stsem.log.pixels.still import png_samples, still_colour
 from stsem.log.schemas.messages import CompressedImage, RawImage
+
+NO_COLOURS: Mapping[int, Colour] = {}
 
 
 def colour(message: ImageMessage, size: Size | None = None) -> Image:
@@ -73,15 +75,15 @@ def depth(message: ImageMessage, size: Size | None = None) -> Depth:
     return in_metres(png_samples(png))
 
 
-def labels(message: ImageMessage, colours: Sequence[Colour] = ()) -> Array:
+def labels(message: ImageMessage, colours: Mapping[int, Colour] = NO_COLOURS) -> Array:
     """Class ids as they stand: (H, W) uint8 or uint16, or (H, W, 3) uint8 RGB when they are colours.
 
-    A png with a palette gives its indices, or its colours if every one in use is among `colours`. Ids that 16 bits
-    cannot hold become 65535.
+    A png with a palette gives its indices; or its colours, if it paints any index in the colour of a class that has
+    another id. Ids that 16 bits cannot hold become 65535.
 
     Args:
         message: raw or compressed, of any size.
-        colours: of the class table.
+        colours: id in the images -> colour, of the class table.
 
     Raises:
         ValueError: it cannot be decoded, or cannot be labels.
@@ -124,14 +126,17 @@ def _label_png(message: CompressedImage) -> Png:
     return read_png(message.data)
 
 
-def _png_labels(png: Png, colours: Sequence[Colour]) -> Array:
+def _png_labels(png: Png, colours: Mapping[int, Colour]) -> Array:
     pixels = png_samples(png)
     if pixels.ndim == 3 and pixels.dtype != np.uint8:
         raise ValueError("labels need whole numbers or colours of 8 bits, but a coloured png of 16 bits came")
     if png.head.colour_type != PALETTE or not colours:
         return pixels
     palette = np.frombuffer(png.palette[: len(png.palette) // 3 * 3], np.uint8).reshape(-1, 3)
-    used = np.flatnonzero(np.bincount(pixels.ravel(), minlength=256))
-    if used[-1] < len(palette) and {(int(r), int(g), int(b)) for r, g, b in palette[used]} <= set(colours):
-        return palette[pixels]
-    return pixels
+    used = np.flatnonzero(np.bincount(pixels.ravel(), minlength=256)).tolist()
+    if used[-1] >= len(palette):
+        return pixels
+    painted = {index: (int(r), int(g), int(b)) for index, (r, g, b) in zip(used, palette[used], strict=True)}
+    of_classes = set(colours.values())
+    elsewhere = any(colour in of_classes and colours.get(index) != colour for index, colour in painted.items())
+    return palette[pixels] if elsewhere else pixels
