@@ -42,8 +42,9 @@ class ImageChannel:
         except LogError:
             raise
         except Exception as err:  # bytes of a stranger, read by parsers with errors of their own
-            self._damage.undecodable(self.topic, place, offset)
-            raise DecodeError(self.topic, int(self.rows.stamp_ns[row]), plain(str(err)) or type(err).__name__) from err
+            reason = plain(str(err)) or type(err).__name__
+            self._damage.undecodable(self.topic, place, offset, reason)
+            raise DecodeError(self.topic, int(self.rows.stamp_ns[row]), reason) from err
 
     def first(self, convert: Callable[[ImageMessage], T]) -> tuple[int, T] | None:
         """(row, `convert` of it) of the first message that can be decoded; None when there is no such message."""

@@ -123,8 +123,8 @@ class Track:
         stamp_ns = None
         try:
             stamp_ns = self._take(self.row, self.decode, payload, log_ns)
-        except Exception:  # noqa: BLE001  any error of a foreign parser means: undecodable
-            self._damage.undecodable(self.topic, place, offset)
+        except Exception as err:  # noqa: BLE001  any error of a foreign parser means: undecodable
+            self._damage.undecodable(self.topic, place, offset, str(err) or type(err).__name__)
             if self.row.kind not in IMAGES:
                 return
         if stamp_ns is None:

@@ -288,9 +288,10 @@ def test_the_fingerprint_keeps_sections_apart() -> None:
 def test_damage_counts_a_message_once() -> None:
     damage = Damage()
     assert (damage.lossy, str(damage)) == (False, "none")
+    damage.undecodable("/cam", 30, 20, "the jpeg ends early")
     for _ in range(3):
-        damage.undecodable("/cam", 10, 20)
+        damage.undecodable("/cam", 10, 20, "it is\nno jpeg")
     damage.count("truncated")
     damage.count("lost_message", "/cam", 0)
-    assert damage.as_dict() == {"lossy": True, "counts": {"truncated": {"": 1}, "undecodable": {"/cam": 1}}}
-    assert str(damage) == "truncated 1, undecodable 1 (/cam)"
+    assert damage.as_dict() == {"lossy": True, "counts": {"truncated": {"": 1}, "undecodable": {"/cam": 2}}}
+    assert str(damage) == "truncated 1, undecodable 2 (/cam); the first of /cam: it is\\nno jpeg"

@@ -128,12 +128,14 @@ REFUSALS = (
     Refusal(
         Variant("refused-jpeg-labels", "labels in jpeg or webp, which change ids",
                 labels=labels(_stills(lambda view: encoded(".jpg", view.labels), "jpeg"), f"{LABELS}/compressed")),
-        "undecodable 12 (/gt/labels/compressed)", kind="damage",
+        "undecodable 12 (/gt/labels/compressed); the first of /gt/labels/compressed: labels need a lossless "
+        "image (raw or png), but jpeg came ('jpeg'), which changes ids", kind="damage",
     ),
     Refusal(
         Variant("refused-mixed-labels", "labels in an encoding that mixes pixels",
                 labels=labels(lambda make, t, v: make.image(t, np.dstack([v.labels, v.labels]), "yuyv"))),
-        "undecodable 12 (/gt/labels)", kind="damage",
+        "undecodable 12 (/gt/labels); the first of /gt/labels: labels need ids or colours as they are, but yuyv came, "
+        "which mixes pixels", kind="damage",
     ),
     Refusal(
         Variant("refused-float-labels", "labels in floats",

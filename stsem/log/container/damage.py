@@ -23,6 +23,8 @@ what stands behind the closing magic of the first is `unread_byte`; give them as
 import threading
 from collections import defaultdict
 
+from stsem.plain import plain
+
 MAX_REMEMBERED = 1 << 20
 KINDS = (
     "truncated", "bad_record", "chunk_crc", "chunk_unreadable", "lost_message", "unknown_channel", "undecodable",
@@ -40,6 +42,7 @@ class Damage:
     def __init__(self) -> None:
         self._counts: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
         self._undecodable: set[tuple[str, int, int]] = set()
+        self._reasons: dict[str, tuple[int, int, str]] = {}
         self._lock = threading.Lock()
 
     def count(self, kind: str, channel: str = "", n: int = 1) -> None:
@@ -48,9 +51,10 @@ class Damage:
             with self._lock:
                 self._counts[kind][channel] += n
 
-    def undecodable(self, channel: str, place: int, offset: int) -> None:
+    def undecodable(self, channel: str, place: int, offset: int, reason: str) -> None:
         """Add the message at (`place`, `offset`) of `channel`, once; from the millionth on they are not told apart."""
         with self._lock:
+            self._reasons[channel] = min(self._reasons.get(channel, (place, offset, reason)), (place, offset, reason))
             if len(self._undecodable) < MAX_REMEMBERED:
                 self._undecodable.add((channel, place, offset))
             else:
@@ -75,7 +79,17 @@ class Damage:
         """Plain data for the report: {"lossy": bool, "counts": {kind: {channel: n}}}."""
         return {"lossy": self.lossy, "counts": self.counts}
 
+    @property
+    def reasons(self) -> dict[str, str]:
+        """channel -> why the first of its undecodable messages cannot be decoded."""
+        with self._lock:
+            return {channel: plain(reason) for channel, (_, _, reason) in sorted(self._reasons.items())}
+
     def __str__(self) -> str:
+        reasons = "".join(f"; the first of {channel}: {reason}" for channel, reason in self.reasons.items())
+        return self._summary() + reasons
+
+    def _summary(self) -> str:
         parts = (
             f"{kind} {sum(channels.values())}" + (f" ({', '.join(filter(None, channels))})" if any(channels) else "")
             for kind, channels in self.counts.items()
