@@ -95,10 +95,11 @@ def _has_truth(log: Log) -> bool:
 
 def _oracle(log: Log) -> Model:
     if log.classes is None or not _has_truth(log):
+        damage = log.info.damage
         raise ClassTableError(
             f"The oracle needs truth, but {log.info.name} has "
-            f"{'no label channel' if log.info.choice.labels is None else 'no class table or no labelled frame'}; "
-            "choose a network with --model."
+            f"{'no label channel' if log.info.choice.labels is None else 'no class table or no labelled frame'}"
+            f"{f' (the log is damaged: {damage})' if damage.lossy else ''}; choose a network with --model."
         )
     segmenter = OracleSegmenter(lambda index: log.plans[index].has_truth, log.truth)
     return Model("oracle", None, log.classes, None, "", lambda threads, times: Memo(segmenter))

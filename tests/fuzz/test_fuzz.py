@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 
 from tests.fuzz import impatient
 from tests.fuzz.campaign import judging, tasks
@@ -18,7 +19,7 @@ from tests.fuzz.regressions import REGRESSIONS
 from tests.fuzz.subjects import SUBJECTS, written
 from tests.fuzz.workers import verdicts
 
-MUTANTS = 150
+MUTANTS = 135
 FIRST_SEED = 1_000_000
 
 
@@ -78,6 +79,16 @@ def test_a_score_that_differs_in_silence_is_a_failure(bench: Bench, logs: dict[s
     assert found.kind == "valid"
     assert "other than undamaged in pixels" in failure("protobuf", found, {"protobuf": whole.content})
     assert failure("bare-protobuf", found, {"bare-protobuf": whole.content}) == ""
+
+
+def test_a_log_that_lost_its_class_table_is_refused_for_that(bench: Bench, logs: dict[str, bytes]) -> None:
+    broken = bytearray(logs["ros2"])
+    chunk = next(at for at in record_places(broken) if broken[at] == Opcode.CHUNK)
+    broken[chunk + 200] ^= 1
+    found = bench.evaluate(bytes(broken))
+    assert found.kind == "refused"
+    assert "no class table" in found.text
+    assert "the log is damaged: chunk_" in found.text
 
 
 @pytest.mark.parametrize(
