@@ -1,6 +1,7 @@
 """What is kept of every judged frame: enough for any score, stratum, pairing or resampling later, and no pixels."""
 
 from array import array
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -8,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.metrics.confusion import Matrix
-from stsem.metrics.scores import ClassMask, Scores, Tally, mean_iou_over, pixel_accuracies, scores, tally
+from stsem.metrics.scores import ClassMask, Scores, mean_iou_over, pixel_accuracies, scores, tally
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,12 +19,12 @@ class Samples:
     Args:
         index: (n,) int64 log indices.
         stamp_ns: (n,) int64 capture stamps.
-        tallies: (n, 3, C) int64: pixels right, of truth, predicted, per class (see `scores.Tally`).
+        tallies: (n, 3, C) int32: pixels right, of truth, predicted, per class (see `scores.Tally`).
     """
 
     index: npt.NDArray[np.int64]
     stamp_ns: npt.NDArray[np.int64]
-    tallies: Tally
+    tallies: npt.NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.index)
@@ -34,14 +35,33 @@ class Samples:
         return pixel_accuracies(self.tallies)
 
     @property
-    def pixel_accuracy_by_index(self) -> dict[int, float]:
-        """Pixel accuracy by log index."""
-        return dict(zip(self.index.tolist(), self.pixel_accuracy.tolist(), strict=True))
-
-    @property
     def class_set(self) -> ClassMask:
         """(C,) the classes with truth pixels in the full sample."""
         return np.asarray(self.tallies[:, 1].sum(axis=0) > 0)
+
+
+class FrameValues(Mapping[int, float]):
+    """A number for some frames, by log index.
+
+    Args:
+        index: (n,) int64, ascending.
+        values: (n,) float64.
+    """
+
+    def __init__(self, index: npt.NDArray[np.int64], values: npt.NDArray[np.float64]) -> None:
+        self._index, self._values = index, values
+
+    def __getitem__(self, index: int) -> float:
+        row = int(np.searchsorted(self._index, index))
+        if row == len(self._index) or self._index[row] != index:
+            raise KeyError(index)
+        return float(self._values[row])
+
+    def __iter__(self) -> Iterator[int]:
+        return map(int, self._index)
+
+    def __len__(self) -> int:
+        return len(self._index)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +179,7 @@ class FrameTallies:
 
     def compute(self) -> Samples:
         """What bootstrap and pairing need."""
-        frames = np.array(self._frames, np.int64).reshape(-1, 2)
+        frames = np.asarray(self._frames, np.int64).reshape(-1, 2)
         order = np.argsort(frames[:, 0])
-        tallies = np.array(self._tallies, np.int32).reshape(-1, 3, self._classes)
-        return Samples(frames[order, 0], frames[order, 1], tallies[order].astype(np.int64))
+        tallies = np.asarray(self._tallies, np.int32).reshape(-1, 3, self._classes)
+        return Samples(frames[order, 0], frames[order, 1], tallies[order])

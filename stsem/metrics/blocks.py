@@ -30,7 +30,8 @@ class Blocks:
     """Stretches of equal log time.
 
     Args:
-        of_frame: (n,) int64, number of the block that each frame is in, 0..count - 1; empty stretches have no number.
+        of_frame: (n,) int64, ascending: number of the block that each frame is in, 0..count - 1; empty stretches have
+            no number.
         count: blocks with frames.
         length_ns: log time of one block.
         autocorrelation_ns: the longest autocorrelation time found.
@@ -45,10 +46,10 @@ class Blocks:
     autocorrelation_ns: int
     inflation: float
 
-    def sums(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def sums(self, values: npt.NDArray[np.float64] | npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
         """(count, ...) sums over the frames of each block of values (n, ...)."""
-        result = np.zeros((self.count, *values.shape[1:]), np.float64)
-        np.add.at(result, self.of_frame, values)
+        starts = np.searchsorted(self.of_frame, np.arange(self.count))
+        result: npt.NDArray[np.float64] = np.add.reduceat(values, starts, axis=0, dtype=np.float64)
         return result
 
 

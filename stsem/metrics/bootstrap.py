@@ -16,7 +16,7 @@ import numpy.typing as npt
 from stsem.chance import generator
 from stsem.metrics.accumulate import Samples
 from stsem.metrics.blocks import Blocks, NoInterval, cut
-from stsem.metrics.scores import ClassMask
+from stsem.metrics.scores import ClassMask, Tally
 
 Metric = Literal["miou", "pixel_accuracy"]
 Floats = npt.NDArray[np.float64]
@@ -111,11 +111,12 @@ def over_logs(
 class _Ratios:
     """A score as the mean of K ratios of sums over units: per unit a numerator and a denominator for each ratio."""
 
-    def __init__(self, tallies: npt.NDArray[np.int64], metric: Metric, class_set: ClassMask) -> None:
+    def __init__(self, tallies: Tally, metric: Metric, class_set: ClassMask) -> None:
         right, truth, predicted = np.moveaxis(tallies, 1, 0)
         if metric == "miou":
             kept = np.flatnonzero(class_set)
-            self.above, self.below = right[:, kept] + 0.0, (truth + predicted - right)[:, kept] + 0.0
+            self.above = right[:, kept] + 0.0
+            self.below = truth[:, kept] + 0.0 + predicted[:, kept] - right[:, kept]
         else:
             self.above, self.below = (right.sum(axis=1, keepdims=True) + 0.0, truth.sum(axis=1, keepdims=True) + 0.0)
         self.fill = self.above.sum(axis=0) / self.below.sum(axis=0)
@@ -146,7 +147,7 @@ def _of_blocks(
     _require_same_frames(runs)
     if isinstance(blocks, NoInterval):
         return blocks
-    sums = [blocks.sums(run.tallies.astype(np.float64)).astype(np.int64) for run in runs]
+    sums = [blocks.sums(run.tallies).astype(np.int64) for run in runs]
     return _bootstrap(sums, metric, seed, len(runs[0]), blocks.inflation)
 
 

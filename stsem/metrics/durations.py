@@ -1,6 +1,7 @@
 """Order statistics of durations, stated only when there are enough samples for them."""
 
-from collections.abc import Iterable
+from array import array
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -35,7 +36,7 @@ class Summary:
         return self.n if self.n_distinct is None else min(self.n, self.n_distinct)
 
 
-def percentile_ns(ascending_ns: list[int], per_mille: int) -> int:
+def percentile_ns(ascending_ns: Sequence[int], per_mille: int) -> int:
     """sorted[ceil(p n) - 1] with p = `per_mille` / 1000, in integers.
 
     Raises:
@@ -77,7 +78,7 @@ class Durations:
 
     def __init__(self, distinct_samples: int | None = None) -> None:
         self._distinct = distinct_samples
-        self.samples_ns: list[int] = []
+        self.samples_ns = array("q")
 
     def update(self, duration_ns: int) -> None:
         """Add one duration in nanoseconds."""

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.classes import ClassSet, Labels
-from stsem.metrics.accumulate import FrameTallies, IndexSet, Judged, Samples, Total
+from stsem.metrics.accumulate import FrameTallies, FrameValues, IndexSet, Judged, Samples, Total
 from stsem.metrics.by_distance import ByDistance, DistanceRow, DistanceSummary, summarise
 from stsem.metrics.confusion import confusion
 from stsem.metrics.durations import Durations, Summary
@@ -164,21 +164,21 @@ class Scorecard:
             ValueError: a frame was judged streaming, but never against itself.
         """
         found, own = self._instants.compute(), self._frames.compute()
-        stamps = dict(zip(own.index.tolist(), own.stamp_ns.tolist(), strict=True))
-        missing = [i for i in found.index.tolist() if i not in stamps]
-        if missing:
+        missing = np.setdiff1d(found.index, own.index)
+        if len(missing):
             raise ValueError(f"frame {missing[0]} was judged streaming only; judge every frame with truth both ways")
-        stamp_ns = np.array([stamps[i] for i in found.index.tolist()], np.int64)
-        return Samples(found.index, stamp_ns, found.tallies)
+        return Samples(found.index, own.stamp_ns[np.searchsorted(own.index, found.index)], found.tallies)
 
-    def pixel_accuracy(self) -> dict[int, float]:
+    def pixel_accuracy(self) -> FrameValues:
         """Pixel accuracy of the scored answers by log index (frames.csv); NaN: the truth is all "ignore"."""
-        found = self.samples().pixel_accuracy_by_index
-        return {index: value for index, value in found.items() if index in self._scored}
+        found = self.samples()
+        scored = np.array([index in self._scored for index in found.index], np.bool_)
+        return FrameValues(found.index[scored], found.pixel_accuracy[scored])
 
-    def streaming_pixel_accuracy(self) -> dict[int, float]:
+    def streaming_pixel_accuracy(self) -> FrameValues:
         """The same for the streaming judgement."""
-        return self._instants.compute().pixel_accuracy_by_index
+        found = self._instants.compute()
+        return FrameValues(found.index, found.pixel_accuracy)
 
     def _total(self) -> Total:
         return Total(len(self._classes), self._known)

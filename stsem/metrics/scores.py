@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Tally = npt.NDArray[np.int64]
+Tally = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 """(..., 3, C): pixels right, pixels of truth, pixels predicted, per class: all that IoU and pixel accuracy need."""
 
 ClassMask = npt.NDArray[np.bool_]

@@ -1,7 +1,9 @@
 """How fast answers come out, and how busy the cores are (DESIGN 5)."""
 
+from array import array
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import ClassVar
 
 import numpy as np
@@ -69,8 +71,7 @@ class ThroughputMeter:
 
     def __init__(self, *, cores: int = 2, deadline_ns: int | None = None, rate: float = 1.0) -> None:
         self._cores, self._deadline_ns, self._rate = cores, deadline_ns, rate
-        self._arrivals: list[int] = []
-        self._answers: list[tuple[int, int]] = []
+        self._arrivals, self._answers, self._answered_stamps = array("q"), array("q"), array("q")
         self._frames = self._in_time = 0
 
     def update(self, result: FrameResult) -> None:
@@ -80,30 +81,30 @@ class ThroughputMeter:
             return
         self._arrivals.append(result.arrival_ns)
         if result.outcome.is_answer and result.answered_ns is not None:
-            self._answers.append((result.answered_ns, result.stamp_ns))
+            self._answers.append(result.answered_ns)
+            self._answered_stamps.append(result.stamp_ns)
             deadline_ns = self._deadline_ns
             self._in_time += deadline_ns is not None and result.answered_ns - result.arrival_ns <= deadline_ns
 
     def compute(self, spans: Sequence[Span]) -> Throughput:
         """The rates, given every job of the run."""
-        answers = sorted(self._answers)
-        times = [answered for answered, _ in answers]
+        times = sorted(self._answers)
         return Throughput(
             output_hz=rate_hz(times),
             offered_hz=rate_hz(self._arrivals),
             outputs=len(times),
             processed_share=len(times) / self._frames if self._frames else None,
-            real_time_factor=self._real_time_factor(answers),
+            real_time_factor=self._real_time_factor(times),
             jitter_ms=jitter_ms(times),
             deadline_misses=None if self._deadline_ns is None else self._frames - self._in_time,
             utilisation=utilisation(spans, self._cores, self._arrivals),
         )
 
-    def _real_time_factor(self, answers: Sequence[tuple[int, int]]) -> float | None:
-        if len(answers) < 2 or answers[-1][0] == answers[0][0]:
+    def _real_time_factor(self, times_ns: Sequence[int]) -> float | None:
+        if len(times_ns) < 2 or times_ns[-1] == times_ns[0]:
             return None
-        stamps = [stamp for _, stamp in answers]
-        return self._rate * (max(stamps) - min(stamps)) / (answers[-1][0] - answers[0][0])
+        stamps = self._answered_stamps
+        return self._rate * (max(stamps) - min(stamps)) / (times_ns[-1] - times_ns[0])
 
 
 def rate_hz(times_ns: Sequence[int]) -> float | None:
@@ -125,6 +126,6 @@ def utilisation(spans: Sequence[Span], cores: int, arrivals_ns: Sequence[int]) -
     if not arrivals_ns:
         return ()
     start = min(arrivals_ns)
-    extent = max([*arrivals_ns, *(span.end_ns for span in spans)]) - start
+    extent = max(chain(arrivals_ns, (span.end_ns for span in spans))) - start
     busy = [sum(s.end_ns - s.start_ns for s in spans if core in s.cores) for core in range(cores)]
     return tuple(ns / extent for ns in busy) if extent else ()

@@ -1,5 +1,6 @@
 """From what one mode did to its part of the report."""
 
+from array import array
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -151,7 +152,7 @@ def _distinct_samples(context: Context, run: ModeRun) -> int | None:
 
 def _distinct_durations(spans: Iterable[Span]) -> int:
     """Of the stage with the largest median in a trace that is replayed: it may have been drawn from a small profile."""
-    durations: dict[str, list[int]] = defaultdict(list)
+    durations: dict[str, array[int]] = defaultdict(lambda: array("q"))
     for span in spans:
         durations[span.stage].append(span.end_ns - span.start_ns)
     slowest = max((sorted(found) for found in durations.values()), key=lambda found: found[len(found) // 2], default=[])

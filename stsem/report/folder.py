@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -36,8 +36,9 @@ def write_folder(inputs: ReportInputs, folder: Path) -> Path:
     check_target(folder)
     with _aside(folder) as aside:
         for name, make in _FILES.items():
-            if (data := make(inputs)) is not None:
-                (aside / name).write_bytes(data)
+            if (pieces := make(inputs)) is not None:
+                with (aside / name).open("wb") as file:
+                    file.writelines(pieces)
         if inputs.trace is not None:
             inputs.trace(aside / "trace.json")
         for name, made in (("map.ply", inputs.point_cloud), ("annotated.mcap", inputs.annotated)):
@@ -47,8 +48,8 @@ def write_folder(inputs: ReportInputs, folder: Path) -> Path:
     return folder
 
 
-_FILES: dict[str, Callable[[ReportInputs], bytes | None]] = {
-    "report.json": lambda inputs: to_bytes(inputs.document),
+_FILES: dict[str, Callable[[ReportInputs], Iterable[bytes] | None]] = {
+    "report.json": lambda inputs: [to_bytes(inputs.document)],
     "frames.csv": frames_csv,
     "trajectory.txt": lambda inputs: inputs.trajectory,
 }

@@ -1,10 +1,12 @@
 """frames.csv: a row per frame and mode, times as exact integers."""
 
-from io import BytesIO
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 from typing import Any
 
 import pandas as pd
 
+from stsem.packed import IntByIndex
 from stsem.report.inputs import FrameRow, ReportInputs
 from stsem.result import STAGES
 
@@ -15,18 +17,18 @@ _INTEGERS = (
 )  # fmt: skip
 
 
-def frames_csv(inputs: ReportInputs) -> bytes:
-    """The bytes of frames.csv; floats in the shortest form that reads back equal. Tables are made block by block."""
-    stages, file = stages_of(inputs.frames), BytesIO()
-    file.write((",".join(_record_columns(stages)) + "\n").encode())
+def frames_csv(inputs: ReportInputs) -> Iterator[bytes]:
+    """frames.csv, piece by piece; floats in the shortest form that reads back equal."""
+    stages = stages_of(chain.from_iterable(inputs.frames.values()))
+    yield (",".join(_record_columns(stages)) + "\n").encode()
     for run in inputs.document.runs:
-        rows = inputs.rows(run.mode)
-        stamps = {row.result.index: row.log_stamp_ns for row in rows}
+        rows, stamps = inputs.rows(run.mode), IntByIndex()
         for begin in range(0, len(rows), BLOCK_ROWS):
             block = rows[begin : begin + BLOCK_ROWS]
+            for row in block:
+                stamps[row.result.index] = row.log_stamp_ns
             table = _table([_record(row, stamps, run.stages_inside, stages) for row in block], stages)
-            table.to_csv(file, header=False, index=False, lineterminator="\n")
-    return file.getvalue()
+            yield table.to_csv(header=False, index=False, lineterminator="\n").encode()
 
 
 def _table(records: list[dict[str, Any]], stages: tuple[str, ...]) -> pd.DataFrame:
@@ -36,13 +38,15 @@ def _table(records: list[dict[str, Any]], stages: tuple[str, ...]) -> pd.DataFra
     return table.astype(dict.fromkeys(whole, "Int64"))
 
 
-def stages_of(rows: tuple[FrameRow, ...]) -> tuple[str, ...]:
+def stages_of(rows: Iterable[FrameRow]) -> tuple[str, ...]:
     """The stages that worked, in pipeline order; unknown ones behind, by name."""
     found = {span.stage for row in rows for span in row.result.spans}
     return (*(stage for stage in STAGES if stage in found), *sorted(found.difference(STAGES)))
 
 
-def _record(row: FrameRow, stamps: dict[int, int], inside: tuple[str, ...], stages: tuple[str, ...]) -> dict[str, Any]:
+def _record(
+    row: FrameRow, stamps: Mapping[int, int], inside: tuple[str, ...], stages: tuple[str, ...]
+) -> dict[str, Any]:
     result, latency = row.result, row.latency_ns
     source = result.keyframe
     record = {

@@ -1,6 +1,6 @@
 """What a report is made from: the document, and what is too large for it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -72,31 +72,31 @@ class ReportInputs:
 
     Args:
         document: the sealed document.
-        frames: rows of all runs, run after run in the document's order, by log index within a run.
+        frames: mode -> the rows of its run, by log index; they may be made when they are looked at.
         strip: up to about five frames worth looking at.
         strip_pass: which pass the strip's answers come from: `offline`, `delivered` or `streaming`.
         trace: writes trace.json to a path; None without a clock.
         answer_classes: classes of the answers where the log has no class table; None where it has.
-        trajectory: bytes of trajectory.txt; None without poses.
+        trajectory: pieces of trajectory.txt; None without poses.
         point_cloud: the finished map.ply, copied into the folder; None without a map.
         annotated: the finished annotated.mcap, copied into the folder; None without `--annotate`.
         plots: whether pictures are drawn (`--no-plots`).
     """
 
     document: Document
-    frames: tuple[FrameRow, ...] = ()
+    frames: Mapping[str, Sequence[FrameRow]] = field(default_factory=dict)
     strip: tuple[StripFrame, ...] = ()
     strip_pass: str = "offline"
     trace: Callable[[Path], None] | None = None
-    trajectory: bytes | None = None
+    trajectory: Iterable[bytes] | None = None
     answer_classes: ClassSet | None = None
     point_cloud: Path | None = None
     annotated: Path | None = None
     plots: bool = True
 
-    def rows(self, mode: str) -> list[FrameRow]:
+    def rows(self, mode: str) -> Sequence[FrameRow]:
         """The rows of one run."""
-        return [row for row in self.frames if row.mode == mode]
+        return self.frames.get(mode, ())
 
     @property
     def class_set(self) -> ClassSet | None:

@@ -46,27 +46,34 @@ class RunTrace:
         cores: how many cores the simulated robot has.
         stamps_ns: log index -> capture stamp as in the log, for every frame with a span.
         spans: the jobs.
-        marks: the instants.
+        marks: the instants; gone through twice.
     """
 
     mode: str
     cores: int
     stamps_ns: Mapping[int, int]
     spans: Sequence[Span]
-    marks: Sequence[Mark] = ()
+    marks: Iterable[Mark] = ()
 
 
-def marks_of(results: Iterable[FrameResult]) -> list[Mark]:
-    """Arrivals, drops and answers of a run; a drop is drawn where the dropped frame arrived."""
-    marks = []
-    for result in results:
-        if result.arrival_ns is not None:
-            marks.append(Mark("arrivals", "arrived", result.index, result.arrival_ns))
-            if result.outcome is Outcome.DROPPED_BUSY:
-                marks.append(Mark("drops", str(result.outcome), result.index, result.arrival_ns))
-        if result.answered_ns is not None:
-            marks.append(Mark("answers", str(result.outcome), result.index, result.answered_ns))
-    return marks
+class Marks(Iterable[Mark]):
+    """Arrivals, drops and answers of a run; a drop is drawn where the dropped frame arrived.
+
+    Args:
+        results: of the run; the marks are made from them whenever they are asked for.
+    """
+
+    def __init__(self, results: Iterable[FrameResult]) -> None:
+        self._results = results
+
+    def __iter__(self) -> Iterator[Mark]:
+        for result in self._results:
+            if result.arrival_ns is not None:
+                yield Mark("arrivals", "arrived", result.index, result.arrival_ns)
+                if result.outcome is Outcome.DROPPED_BUSY:
+                    yield Mark("drops", str(result.outcome), result.index, result.arrival_ns)
+            if result.answered_ns is not None:
+                yield Mark("answers", str(result.outcome), result.index, result.answered_ns)
 
 
 def write_trace(path: Path, runs: Iterable[RunTrace]) -> None:

@@ -57,10 +57,10 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
     trace = _write_trace if clock else None
     return ReportInputs(
         sealed(document),
-        rows,
+        {mode: [row for row in rows if row.mode == mode] for mode in MODES},
         strip,
         trace=trace,
-        trajectory=b"# stamp x y z qx qy qz qw\n",
+        trajectory=[b"# stamp x y z qx qy qz qw\n"],
         answer_classes=ClassSet(CLASSES),
     )
 

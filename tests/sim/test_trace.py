@@ -10,7 +10,7 @@ import pytest
 
 from stsem.errors import CostError
 from stsem.result import FrameResult, Outcome, Span
-from stsem.sim.trace import Mark, RunTrace, is_trace, marks_of, read_durations, schedule_text, write_trace
+from stsem.sim.trace import Mark, Marks, RunTrace, is_trace, read_durations, schedule_text, write_trace
 
 STAMPS = {0: 100, 1: 200}
 SPANS = [Span(0, "segment", (0, 1), 0, 3, 1_000_000_000_000_001), Span(1, "propagate", (1,), 0, 5, 6)]
@@ -68,7 +68,7 @@ def test_marks_tell_arrivals_drops_and_answers() -> None:
         FrameResult(1, 1, 4, None, None, Outcome.DROPPED_BUSY),
         FrameResult(2, 2, None, None, None, Outcome.UNDECODABLE),
     ]
-    assert marks_of(results) == [
+    assert list(Marks(results)) == [
         Mark("arrivals", "arrived", 0, 3),
         Mark("answers", "segmented", 0, 9),
         Mark("arrivals", "arrived", 1, 4),

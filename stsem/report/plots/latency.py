@@ -1,9 +1,12 @@
 """How late the answers are: the share of all frames that is answered within a time."""
 
+from array import array
+from collections.abc import Sequence
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from stsem.report.inputs import ReportInputs
+from stsem.report.inputs import FrameRow, ReportInputs
 from stsem.report.plots.style import INK, MUTED, SURFACE, apart, mode_colour, new_figure, title
 from stsem.report.wording import number
 
@@ -15,8 +18,7 @@ _GROUND = {"facecolor": SURFACE, "edgecolor": "none", "pad": 1.0}
 
 def draw(inputs: ReportInputs) -> Figure | None:
     """One rising step line per mode; it ends at the share of frames that got an answer; None without a clock."""
-    samples = {run.mode: sorted(t for row in inputs.rows(run.mode) if (t := row.latency_ns) is not None)
-               for run in inputs.document.runs}  # fmt: skip
+    samples = {run.mode: _ascending(inputs.rows(run.mode)) for run in inputs.document.runs}
     if not any(samples.values()):
         return None
     figure = new_figure(3.4)
@@ -39,7 +41,11 @@ def draw(inputs: ReportInputs) -> Figure | None:
     return figure
 
 
-def _steps(axes: Axes, times_ns: list[int], frames: int, longest_ms: float, colour: str) -> None:
+def _ascending(rows: Sequence[FrameRow]) -> Sequence[int]:
+    return array("q", sorted(t for row in rows if (t := row.latency_ns) is not None))
+
+
+def _steps(axes: Axes, times_ns: Sequence[int], frames: int, longest_ms: float, colour: str) -> None:
     ranks = sorted({i * (len(times_ns) - 1) // (POINTS - 1) for i in range(POINTS)})
     ms = [times_ns[k] / 1e6 for k in ranks]
     share = [100 * (k + 1) / frames for k in ranks]

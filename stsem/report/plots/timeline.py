@@ -1,5 +1,7 @@
 """What the two simulated cores did, job by job, and what became of each arrival."""
 
+from collections.abc import Sequence
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -44,11 +46,11 @@ def draw(inputs: ReportInputs) -> Figure | None:
     return figure
 
 
-def _first(rows: list[FrameRow]) -> list[FrameRow]:
+def _first(rows: Sequence[FrameRow]) -> Sequence[FrameRow]:
     return rows[:FRAMES_SHOWN]
 
 
-def _panel(axes: Axes, rows: list[FrameRow], cores: int, end_ms: float) -> None:
+def _panel(axes: Axes, rows: Sequence[FrameRow], cores: int, end_ms: float) -> None:
     for row in rows:
         for span in row.result.spans:
             _job(axes, span, end_ms)
