@@ -21,6 +21,7 @@ ATTACHMENT = "classes.json"
 FORMS = 'a list of names, {"names": [...]}, {id: name} or {name: "#rrggbb id"}'
 _PALETTE = re.compile(r"#([0-9a-fA-F]{6})(?:\s+(\d+))?")
 _UNKNOWN = 254
+"""Stands for ids and colours outside the table until they are counted; with 255 classes it is the last one's id."""
 OUTSIDE = 65535
 """What an id becomes in a label image that 16 bits cannot hold."""
 
@@ -52,6 +53,7 @@ class Translator:
 
     def __init__(self, table: ClassTable) -> None:
         self._table = table
+        self._unknown = _UNKNOWN if len(table.classes) <= _UNKNOWN else NO_LABEL
         self._by_id: dict[int, Labels] = {}
         self._by_colour: Labels | None = None
 
@@ -70,30 +72,33 @@ class Translator:
             labels = np.asarray(cv2.LUT(raw, self._ids(256)), np.uint8)
         else:
             labels = self._ids(1 << 16).take(raw, mode="wrap")
-        if len(self._table.classes) > _UNKNOWN:
-            return labels, 0
-        unknown = labels == _UNKNOWN
+        unknown = labels == self._unknown
         count = int(np.count_nonzero(unknown))
-        if count:
+        if count and self._unknown != NO_LABEL:
             labels[unknown] = NO_LABEL
+        elif count and raw.ndim == 2:
+            count -= int(np.isin(raw, self._silent()).sum())
         return labels, count
 
     def _ids(self, size: int) -> Labels:
         if size not in self._by_id:
-            lut = np.full(size, _UNKNOWN, np.uint8)
-            ignored = (raw if 0 <= raw < OUTSIDE else OUTSIDE for raw in (NO_LABEL, *self._table.ignored))
-            lut[[raw for raw in ignored if raw < size]] = NO_LABEL
+            lut = np.full(size, self._unknown, np.uint8)
+            lut[[raw for raw in self._silent() if raw < size]] = NO_LABEL
             for own, raw in enumerate(self._table.raw_ids):
                 if raw < size:
                     lut[raw] = own
             self._by_id[size] = lut
         return self._by_id[size]
 
+    def _silent(self) -> list[int]:
+        """Raw ids that are ignored and not counted as unknown."""
+        return [raw if 0 <= raw < OUTSIDE else OUTSIDE for raw in (NO_LABEL, *self._table.ignored)]
+
     def _colours(self) -> Labels:
         if not self._table.classes.colours:
             raise ValueError(f"labels are colours, but the class table ({self._table.source}) has none")
         if self._by_colour is None:
-            lut = np.full(1 << 24, _UNKNOWN, np.uint8)
+            lut = np.full(1 << 24, self._unknown, np.uint8)
             for own, (r, g, b) in enumerate(self._table.classes.colours):
                 lut[r << 16 | g << 8 | b] = own
             self._by_colour = lut

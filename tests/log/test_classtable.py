@@ -129,10 +129,26 @@ def test_colours_are_translated_through_the_palette() -> None:
         Translator(table_of(NAMES))(raw)
 
 
-def test_255_classes_leave_no_room_to_count_but_are_translated() -> None:
+@pytest.mark.parametrize("count", [254, 255])
+@pytest.mark.parametrize("ignored", [(), (7, 999)])
+def test_as_many_classes_as_there_can_be(count: int, ignored: tuple[int, ...]) -> None:
+    """With 255 classes no id is left to mark the unknown with; they are ignored and counted all the same."""
+    translate = Translator(table_of({1000 + i: f"c{i}" for i in range(count)}, ignored))
+    labels, unknown = translate(np.array([[1000, 999 + count, 999, 7, 255, 65535]], np.uint16))
+    assert labels[0].tolist() == [0, count - 1, 255, 255, 255, 255]
+    assert unknown == 3 - len(ignored)
+
+
+def test_255_classes_of_8_bits() -> None:
     labels, unknown = Translator(table_of({i: f"c{i}" for i in range(255)}))(np.arange(256, dtype=np.uint8)[None])
     assert labels[0].tolist() == list(range(256))
     assert unknown == 0
+
+
+def test_255_classes_of_colours() -> None:
+    document = {f"c{i}": f"#{i:06x} {i}" for i in range(255)}
+    labels, unknown = Translator(parse(document, "test"))(np.array([[[0, 0, 254], [0, 0, 255]]], np.uint8))
+    assert (labels.tolist(), unknown) == ([[254, 255]], 1)
 
 
 plain = st.recursive(
