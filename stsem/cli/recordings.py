@@ -20,8 +20,8 @@ def recordings(given: Sequence[str]) -> list[tuple[str, ...]]:
     """
     if twice := [one for one in given if given.count(one) > 1]:
         raise UsageError(f"{without_secrets(twice[0])} was given twice; give each log once.")
-    groups: dict[str, list[str]] = {}
+    groups: dict[tuple[str, ...], list[str]] = {}
     for one in given:
         part = _PART.fullmatch(without_secrets(one) if is_url(one) else one)
-        groups.setdefault(part.group(1) + part.group(2) if part else one, []).append(one)
+        groups.setdefault(part.groups() if part else (one,), []).append(one)
     return [tuple(group) for group in groups.values()]

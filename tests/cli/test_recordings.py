@@ -14,6 +14,7 @@ from stsem.errors import UsageError
         (["b.mcap", "a.mcap"], [["b.mcap"], ["a.mcap"]]),
         (["a_0.mcap", "a_1.mcap", "a_10.mcap"], [["a_0.mcap", "a_1.mcap", "a_10.mcap"]]),
         (["a_0.mcap", "b_0.mcap", "a_1.mcap"], [["a_0.mcap", "a_1.mcap"], ["b_0.mcap"]]),
+        (["a.mcap", "a_1.mcap"], [["a.mcap"], ["a_1.mcap"]]),
         (["x/a_0.mcap", "y/a_1.mcap"], [["x/a_0.mcap"], ["y/a_1.mcap"]]),
         (["a_0.mcap", "a_1.txt"], [["a_0.mcap"], ["a_1.txt"]]),
         (["https://h/a_0.mcap?t=1", "https://h/a_1.mcap?t=2"], [["https://h/a_0.mcap?t=1", "https://h/a_1.mcap?t=2"]]),
