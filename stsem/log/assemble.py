@@ -88,14 +88,16 @@ def assemble(
     asked = check_overrides(topics, tracks)
     channels = {id(t): ImageChannel(t, store, scan.damage) for t in tracks if t.kind in IMAGES and t.count}
     images = [Candidate(channel.track, channel.look()) for channel in channels.values()]
-    color = _asked(images, asked, "color") or choose_color(images, tracks)
+    free = [image for image in images if not any(image.track is track for track in asked.values())]
+    color = _asked(images, asked, "color") or choose_color(free, tracks)
     result = Assembly(channels[id(color.track)], (0, 0), images=images, asked=frozenset(asked))
     _refuse_unrelated(scan.files, result.color)
     refuse_restarted(result.color)
     result.size = _size(result.color)
-    others = [c for c in images if c is not color]
-    depth = _partner(others, asked, "depth", color, result.warnings)
-    labels = _partner([c for c in others if c is not depth], asked, "labels", color, result.warnings)
+    free = [image for image in free if image is not color]
+    depth = _asked(images, asked, "depth") or _partner(free, "depth", color, result.warnings)
+    free = [image for image in free if image is not depth]
+    labels = _asked(images, asked, "labels") or _partner(free, "labels", color, result.warnings)
     if depth is not None:
         result.depth = channels[id(depth.track)]
     if labels is not None:
@@ -139,11 +141,7 @@ def _asked(images: Sequence[Candidate], asked: Mapping[str, Track], role: str) -
     return found
 
 
-def _partner(
-    images: Sequence[Candidate], asked: Mapping[str, Track], role: str, color: Candidate, warnings: list[str]
-) -> Candidate | None:
-    if found := _asked(images, asked, role):
-        return found
+def _partner(images: Sequence[Candidate], role: str, color: Candidate, warnings: list[str]) -> Candidate | None:
     found, warning = choose_partner(images, role, color)
     if warning:
         warnings.append(warning)

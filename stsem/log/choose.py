@@ -101,6 +101,10 @@ def check_overrides(topics: Mapping[str, str], tracks: Sequence[Track]) -> dict[
                 f"({track.encoding}); {track.trouble or 'choose another topic'}.",
                 role,
             )
+        if rival := next((other for other in chosen if chosen[other] is track), None):
+            raise ChannelError(
+                f"{topic} was given for {rival} and for {role}; a channel can be only one of them.", role
+            )
         chosen[role] = track
     return chosen
 

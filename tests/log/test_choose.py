@@ -247,6 +247,17 @@ def test_overrides(tmp_path: Path) -> None:
         open_log([path], topics={"colour": "/cam"})
 
 
+def test_what_is_asked_for_in_one_role_is_not_chosen_for_another(tmp_path: Path) -> None:
+    """The only 16 bits are the labels that were asked for, and the only other picture of colours, too."""
+    path = record(tmp_path / "log.mcap", {"/cam": "rgb", "/ids": "depth", "/painted": "rgb"})
+    for asked, depth in (({"color": "/cam", "labels": "/ids"}, None), ({"labels": "/painted"}, "/ids")):
+        with open_log([path], topics=asked) as log:
+            choice = log.info.choice
+            assert (choice.color, choice.depth, choice.labels) == ("/cam", depth, asked["labels"])
+    with pytest.raises(ChannelError, match=r"^/cam was given for color and for labels; a channel can be only one"):
+        open_log([path], topics={"color": "/cam", "labels": "/cam"})
+
+
 def test_an_ambiguity_says_its_role_and_its_rivals(tmp_path: Path) -> None:
     with pytest.raises(ChannelError) as caught:
         open_log([record(tmp_path / "log.mcap", {"/left/image_raw": "rgb", "/right/image_raw": "rgb"})])
