@@ -10,6 +10,8 @@ from stsem.log.tracks import Int64, References
 MAX_DEPTH_OFFSET_NS = 20_000_000
 UNKNOWN_PERIOD_NS = 100_000_000
 MAX_CANDIDATES = 16
+MAX_WINDOW_S = 1e10
+"""More than any two stamps can be apart; a larger number would be no integer of any use."""
 NEEDS = frozenset({"depth", "pose"})
 
 
@@ -122,8 +124,12 @@ def window(stamps_ns: Int64, start_s: float | None, end_s: float | None) -> slic
         UsageError: the window is empty.
     """
     first = int(stamps_ns[0])
-    low = 0 if start_s is None else int(np.searchsorted(stamps_ns, first + round(start_s * 1e9)))
-    high = len(stamps_ns) if end_s is None else int(np.searchsorted(stamps_ns, first + round(end_s * 1e9)))
+
+    def row(seconds: float) -> int:
+        return int(np.searchsorted(stamps_ns, first + round(min(max(seconds, 0.0), MAX_WINDOW_S) * 1e9)))
+
+    low = 0 if start_s is None else row(start_s)
+    high = len(stamps_ns) if end_s is None else row(end_s)
     if low >= high:
         length = (int(stamps_ns[-1]) - first) / 1e9
         raise UsageError(

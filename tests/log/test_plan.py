@@ -92,6 +92,7 @@ def test_the_window_is_half_open_and_counts_from_the_first_stamp() -> None:
     assert window(stamps, None, None) == slice(0, 4)
     assert window(stamps, 0.1, 0.3) == slice(1, 3)
     assert window(stamps, 0.05, None) == slice(1, 4)
+    assert window(stamps, -1e300, 1e300) == slice(0, 4)
     with pytest.raises(UsageError, match=r"colour frames go from 0 to 0\.300 s"):
         window(stamps, 0.31, None)
     with pytest.raises(UsageError, match=r"No colour frame lies between --start 0\.2 and --end 0\.1"):
