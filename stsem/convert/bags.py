@@ -10,10 +10,10 @@ from stsem.convert import rosbag1, rosbag2
 from stsem.convert.definitions import definition
 from stsem.convert.recording import Loss, Options, Progress, Summary
 from stsem.errors import ConversionError
+from stsem.log.container.records import MAGIC
 from stsem.log.mcapfile import McapFile
+from stsem.log.tracks import MAX_NS
 
-MCAP_MAGIC = b"\x89MCAP0\r\n"
-MAX_TIME_NS = 1 << 63
 MAX_CHANNELS = 10_000
 _NO_EFFECT = "Bags are copied as they are: give --classes and the like to stsem-replay, not here."
 _OUT_OF_TIME = "messages with a log time that cannot be"
@@ -32,7 +32,7 @@ def is_rosbag2(source: Path) -> bool:
 def is_mcap(source: Path) -> bool:
     """Whether it is an MCAP file, or a folder with one: nothing to be converted."""
     with suppress(OSError):
-        return _begins_with(source, MCAP_MAGIC) or (
+        return _begins_with(source, MAGIC) or (
             source.is_dir() and any(path.suffix == ".mcap" and path.is_file() for path in source.iterdir())
         )
     return False
@@ -162,7 +162,7 @@ class _Copy:
     def _write(self, channel: int | str, log_ns: int, data: bytes) -> None:
         if isinstance(channel, str):
             self._losses[channel] += 1
-        elif not 0 <= log_ns < MAX_TIME_NS:
+        elif not 0 <= log_ns < MAX_NS:
             self._losses[_OUT_OF_TIME] += 1
         else:
             self._log.message(channel, log_ns, log_ns, data, self._sequences[channel])

@@ -17,7 +17,6 @@ from stsem.convert.imagefiles import (
     events,
     files,
     first_folders,
-    natural,
     read_text,
     stated_truth,
     truth_of,
@@ -25,6 +24,7 @@ from stsem.convert.imagefiles import (
 )
 from stsem.convert.recording import Options, Recording, even_stamp_ns
 from stsem.errors import ConversionError
+from stsem.log.container.files import natural
 
 RATE_HZ = 30.0
 _LEVELS = 2

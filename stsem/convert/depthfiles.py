@@ -10,10 +10,10 @@ from stsem.frame import Depth
 
 
 def metres(units_per_metre: float) -> Callable[[npt.NDArray[Any]], Depth]:
-    """From (H, W) uint16 samples, 0 unknown, to (H, W) float32 metres, NaN unknown."""
+    """From (H, W) uint16 samples, 0 and 65535 unknown as in a log, to (H, W) float32 metres, NaN unknown."""
     with np.errstate(over="ignore"):
         table: Depth = (np.arange(1 << 16) / units_per_metre).astype(np.float32)
-    table[0] = np.nan
+    table[[0, 65535]] = np.nan
 
     def convert(samples: npt.NDArray[Any]) -> Depth:
         if samples.dtype != np.uint16 or samples.ndim != 2:

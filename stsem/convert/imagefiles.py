@@ -1,7 +1,6 @@
 """Image files in folders: listed in natural order, read one by one, and nothing outside the source is opened."""
 
 import os
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -17,6 +16,7 @@ from stsem.convert.recording import ColorEvent, DepthEvent, Event, Loss, Options
 from stsem.errors import ConversionError
 from stsem.frame import Depth
 from stsem.log import classtable
+from stsem.log.container.files import natural
 from stsem.log.pixels import decode, formats
 from stsem.log.schemas.messages import CompressedImage
 from stsem.pose import Pose
@@ -28,7 +28,6 @@ MAX_TEXT_BYTES = 16 << 20
 _LISTED = 8
 _LOOKED_AT = 500
 _Kind = tuple[str, Callable[["Capture"], Path | None], Callable[[int, bytes], Event]]
-_NUMBER = re.compile(r"(\d+)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +47,6 @@ class Truth:
 
     classes: ClassSet
     labels: Callable[[npt.NDArray[Any]], Labels]
-
-
-def natural(name: str) -> tuple[tuple[tuple[bool, int, str], ...], str]:
-    """Sorting key under which frame 9 comes before frame 10, however many zeros they have; numbers before words."""
-    parts = (part for part in _NUMBER.split(name) if part)
-    return tuple((False, int(p), "") if p.isdecimal() else (True, 0, p) for p in parts), name
 
 
 def first_folders(root: Path, depth: int) -> Iterator[Path]:

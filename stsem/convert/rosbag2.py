@@ -16,9 +16,9 @@ from urllib.parse import quote
 
 import zstandard
 
-from stsem.convert.imagefiles import natural
 from stsem.convert.recording import Loss
 from stsem.errors import ConversionError, OutputError
+from stsem.log.container.files import natural
 
 SUFFIX, PACKED_SUFFIX, METADATA = ".db3", ".db3.zstd", "metadata.yaml"
 MAX_MESSAGE_BYTES = 1 << 30

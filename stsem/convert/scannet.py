@@ -1,14 +1,15 @@
 """ScanNet: a `.sens` file, and when at hand the label images of its folder in the 20 evaluated classes of nyu40."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from stsem.convert import nyu40, sens
+from stsem.convert.depthfiles import metres
 from stsem.convert.imagefiles import (
     Truth,
     chosen,
@@ -34,12 +35,14 @@ from stsem.convert.recording import (
 )
 from stsem.convert.rigid import is_rigid
 from stsem.errors import ConversionError
+from stsem.frame import Depth
 from stsem.pose import Pose, inverse
 
 RATE_HZ = 30.0
 LABELS, TABLE = "label-filt", "scannetv2-labels.combined.tsv"
 _LATEST_US = (1 << 32) * 10**6
 _SAME_CLOCK_US = 10**6
+ToMetres = Callable[[npt.NDArray[Any]], Depth]
 
 
 def detect(source: Path) -> bool:
@@ -67,12 +70,13 @@ def read(source: Path, options: Options) -> Recording:
     _note_header(header, notes)
     truth, labels = _truth(path, source, options, len(index), notes)
     color_ns, depth_ns = _stamps(index, options, notes)
-    units = _units_per_metre(header, options, notes)
-    scan = _Scan(path, source, header, index, color_ns, depth_ns, _poses(index, header, notes), units, truth, labels)
-    own_depth = units is not None and not _is_registered(header)
+    to_metres = _to_metres(header, options, notes)
+    poses = _poses(index, header, notes)
+    scan = _Scan(path, source, header, index, color_ns, depth_ns, poses, to_metres, truth, labels)
+    own_depth = to_metres is not None and not _is_registered(header)
     return Recording(
         events=_events(scan, notes),
-        count=len(index) * (1 if units is None else 2) + len(scan.poses) + len(labels),
+        count=len(index) * (1 if to_metres is None else 2) + len(poses) + len(labels),
         classes=truth.classes if truth else None,
         camera=header.color,
         depth_camera=header.depth if own_depth else None,
@@ -89,7 +93,7 @@ class _Scan:
         path, source: the file, and the folder (or the file itself) that was given.
         color_ns, depth_ns: (n,) stamps of the frames' images.
         poses: frame -> T_WC.
-        units: of depth per metre; None: depth is left out.
+        to_metres: from samples of depth; None: depth is left out.
         labels: frame -> label image, by `truth`.
     """
 
@@ -100,7 +104,7 @@ class _Scan:
     color_ns: npt.NDArray[np.int64]
     depth_ns: npt.NDArray[np.int64]
     poses: Mapping[int, Pose]
-    units: float | None
+    to_metres: ToMetres | None
     truth: Truth | None
     labels: Mapping[int, Path]
 
@@ -139,12 +143,12 @@ def _color_events(scan: _Scan, frame: int, stream: IO[bytes]) -> Iterator[Event]
 
 
 def _depth_event(scan: _Scan, frame: int, stream: IO[bytes]) -> Iterator[Event]:
-    if scan.units is None:
+    if scan.to_metres is None:
         return
     stamp_ns = int(scan.depth_ns[frame])
     try:
         raw = sens.depth_samples(scan.index.read(stream, frame, "depth_bytes"), scan.header)
-        yield DepthEvent(stamp_ns, sens.metres(raw, scan.units))
+        yield DepthEvent(stamp_ns, scan.to_metres(raw))
     except ValueError:
         yield Loss("depth images that cannot be read", stamp_ns)
 
@@ -207,7 +211,7 @@ def _poses(index: sens.Index, header: sens.Header, notes: list[str]) -> dict[int
     return poses
 
 
-def _units_per_metre(header: sens.Header, options: Options, notes: list[str]) -> float | None:
+def _to_metres(header: sens.Header, options: Options, notes: list[str]) -> ToMetres | None:
     """None when there is no depth that can be used."""
     if header.depth_compression not in (sens.RAW_USHORT, sens.ZLIB_USHORT):
         notes.append("Depth is compressed in a way that is not read (only raw and zlib are): left out.")
@@ -219,7 +223,7 @@ def _units_per_metre(header: sens.Header, options: Options, notes: list[str]) ->
     if not (np.isfinite(units) and units > 0):
         notes.append(f"A depth shift of {units} cannot be: depth is left out; state --depth-scale, 1000 is usual.")
         return None
-    return units
+    return metres(units)
 
 
 def _is_registered(header: sens.Header) -> bool:

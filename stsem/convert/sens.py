@@ -13,7 +13,8 @@ import numpy.typing as npt
 from stsem.camera import Camera
 from stsem.convert.rigid import is_rigid
 from stsem.errors import ConversionError
-from stsem.frame import Depth, Image
+from stsem.frame import Image
+from stsem.log.pixels.sizes import MAX_PIXELS
 from stsem.pose import Pose, inverse
 
 VERSION = 4
@@ -21,7 +22,7 @@ RAW, PNG, JPEG = 0, 1, 2
 RAW_USHORT, ZLIB_USHORT, OCCI_USHORT = 0, 1, 2
 MAX_FRAMES = 1 << 20
 MAX_IMAGE_BYTES = 256 << 20
-_MAX_NAME, _MAX_PIXELS = 4096, 1 << 26
+_MAX_NAME = 4096
 _MATRICES = 4 * 16 * 4
 _TAIL = struct.Struct("<2i4IfQ")
 FRAME = np.dtype([
@@ -75,8 +76,10 @@ def read_header(stream: IO[bytes], path: Path) -> Header:
     tail = _TAIL.unpack(_take(stream, _TAIL.size, path))
     color_size, depth_size = (tail[2], tail[3]), (tail[4], tail[5])
     for what, (width, height) in (("colour", color_size), ("depth", depth_size)):
-        if width * height > _MAX_PIXELS:
-            raise ConversionError(f"{path} says that its {what} images are {width}x{height}: it is broken.")
+        if width * height > MAX_PIXELS:
+            raise ConversionError(
+                f"{path} says that its {what} images are {width}x{height}: it is broken, or too large for a log."
+            )
     return Header(
         color=_camera(matrices[0], color_size),
         depth=_camera(matrices[2], depth_size),
@@ -166,13 +169,6 @@ def depth_samples(data: bytes, header: Header) -> npt.NDArray[np.uint16]:
     if len(data) != expected or not data:
         raise ValueError(f"{len(data)} bytes came for {width}x{height} of 16 bits")
     return np.frombuffer(data, "<u2").reshape(height, width)
-
-
-def metres(samples: npt.NDArray[np.uint16], units_per_metre: float) -> Depth:
-    """(H, W) float32 depth; 0 and 65535 are unknown."""
-    depth = (samples / np.float64(units_per_metre)).astype(np.float32)
-    depth[(samples == 0) | (samples == 65535)] = np.nan
-    return depth
 
 
 def _take(stream: IO[bytes], size: int, path: Path) -> bytes:

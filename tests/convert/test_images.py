@@ -55,6 +55,15 @@ def test_everything_is_found_and_paired_by_number(tmp_path: Path) -> None:
             np.testing.assert_allclose(frame.T_WC, pose(k), atol=1e-9)
 
 
+def test_the_largest_sample_of_depth_is_unknown_as_in_a_log(tmp_path: Path) -> None:
+    root = folder(tmp_path / "walk", 1)
+    write(root / "depth/depth_0.png", np.tile(np.array([0, 1500, 65534, 65535], np.uint16), (HEIGHT, WIDTH // 4)))
+    with convert(images.read, root, tmp_path / "log.mcap", Options(rate_hz=15)).log as log:
+        depth = log.frame(0, depth=True, previous=False).depth
+    assert depth is not None
+    np.testing.assert_array_equal(depth[0, :4], np.array([np.nan, 1.5, 65.534, np.nan], np.float32))
+
+
 @pytest.mark.parametrize(
     ("names", "stamps"),
     [

@@ -63,9 +63,10 @@ def left_out(paths: Iterable[Given]) -> list[str]:
     ]
 
 
-def natural(name: str) -> list[tuple[int, str]]:
-    """Sort key of a name in which numbers count as numbers."""
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.findall(r"\d{1,18}|\D+", name)]
+def natural(name: str) -> tuple[tuple[tuple[bool, int, str], ...], str]:
+    """Sort key under which frame 9 comes before frame 10, however many zeros they have; numbers before words."""
+    parts = re.findall(r"\d{1,18}|\D+", name)  # int() refuses numbers of thousands of digits
+    return tuple((False, int(p), "") if p.isdecimal() else (True, 0, p) for p in parts), name
 
 
 def _identity(given: Given, source: Source) -> tuple[str, str]:
