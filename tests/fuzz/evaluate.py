@@ -192,7 +192,7 @@ def pixels(log: Log) -> str:
         parts = (frame.image, frame.depth, frame.T_WC) if frame else ()
         for part in (*parts, loaded.truth):
             found.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
-    found.update(repr(log.plans).encode())
+    found.update(repr(list(log.plans)).encode())
     return found.hexdigest()
 
 
