@@ -37,10 +37,10 @@ def confusion(truth: Labels, answer: Labels | None, classes: int) -> Matrix:
     if answer is None:
         return _unanswered(truth, classes)
     _require_labels("answer", answer)
-    pairs = _joint_counts(truth, resized(answer, truth.shape[1], truth.shape[0]))
+    pairs = _joint_counts(truth, resized(answer, truth.shape[1], truth.shape[0]), classes)
     matrix = np.empty((classes, classes + 1), np.int64)
-    matrix[:, :classes] = pairs[:classes, :classes]
-    matrix[:, classes] = pairs[:classes, classes:].sum(axis=1)
+    matrix[:, :classes] = pairs[:, :classes]
+    matrix[:, classes] = pairs[:, classes:].sum(axis=1)
     return matrix
 
 
@@ -82,24 +82,24 @@ def _require_labels(name: str, labels: Labels) -> None:
 
 def _unanswered(truth: Labels, classes: int) -> Matrix:
     matrix = np.zeros((classes, classes + 1), np.int64)
-    matrix[:, classes] = _joint_counts(truth, truth).diagonal()[:classes]
+    matrix[:, classes] = np.bincount(truth.ravel(), minlength=NO_LABEL + 1)[:classes]
     return matrix
 
 
-def _joint_counts(a: Labels, b: Labels) -> Matrix:
-    """(256, 256) int64 counts of value pairs of two images of one size."""
+def _joint_counts(a: Labels, b: Labels, rows: int) -> Matrix:
+    """(rows, 256) int64 counts of value pairs of two images of one size, `a` below `rows`."""
     a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
     if a.size < _EXACT_PIXELS:
-        return _histogram(a, b)
+        return _histogram(a, b, rows)
     flat_a, flat_b, step = a.reshape(1, -1), b.reshape(1, -1), _EXACT_PIXELS - 1
-    total = np.zeros((256, 256), np.int64)
+    total = np.zeros((rows, 256), np.int64)
     for start in range(0, a.size, step):
-        total += _histogram(flat_a[:, start : start + step], flat_b[:, start : start + step])
+        total += _histogram(flat_a[:, start : start + step], flat_b[:, start : start + step], rows)
     return total
 
 
-def _histogram(a: Labels, b: Labels) -> Matrix:
+def _histogram(a: Labels, b: Labels, rows: int) -> Matrix:
     if a.size == 0:
-        return np.zeros((256, 256), np.int64)
+        return np.zeros((rows, 256), np.int64)
     # All 256 x 256 pairs are counted, so that no id can fall outside the ranges and vanish.
-    return cv2.calcHist([a, b], [0, 1], None, [256, 256], [0, 256, 0, 256]).astype(np.int64)
+    return cv2.calcHist([a, b], [0, 1], None, [256, 256], [0, 256, 0, 256])[:rows].astype(np.int64)
