@@ -31,7 +31,7 @@ from stsem.log.scan import Scan
 from stsem.log.schemas.messages import Kind
 from stsem.log.sizes import usual_size
 from stsem.log.stamps import clock_offsets, clock_warnings, refuse_restarted
-from stsem.log.tracks import IMAGES, Track
+from stsem.log.tracks import Track
 
 
 @dataclass
@@ -86,7 +86,7 @@ def assemble(
         raise UsageError(f"--depth-registered is {depth_registered!r}, but it can be {', '.join(REGISTERED)}.")
     tracks = list(scan.tracks.values())
     asked = check_overrides(topics, tracks)
-    channels = {id(t): ImageChannel(t, store, scan.damage) for t in tracks if t.kind in IMAGES and t.count}
+    channels = {id(t): ImageChannel(t, store, scan.damage) for t in tracks if t.is_image and t.count}
     images = [Candidate(channel.track, channel.look()) for channel in channels.values()]
     free = [image for image in images if not any(image.track is track for track in asked.values())]
     color = _asked(images, asked, "color") or choose_color(free, tracks)
@@ -193,10 +193,8 @@ def _find_classes(result: Assembly, scan: Scan, classes_file: Path | None) -> No
     topic = result.labels.topic if result.labels else ""
     nearest = nearest_track(tables, topic)
     messages = nearest.class_names[-1].names if nearest else None
-    if nearest and len(nearest.class_names) > 1:
-        sentence = (
-            f"{nearest.topic} changes its class table {len(nearest.class_names) - 1} times; the last one is used."
-        )
+    if nearest and nearest.changes:
+        sentence = f"{nearest.topic} changes its class table {nearest.changes} times; the last one is used."
         result.warnings.append(Remark("truth-two-tables", sentence))
     table, warnings = find_table(classes_file, messages, scan.metadata, scan.attachments)
     if result.labels is None:

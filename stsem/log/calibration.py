@@ -126,8 +126,8 @@ def read_optics(track: Track, image: Candidate, size: Size) -> Optics:
         sentence = f"{track.topic} says that the camera is uncalibrated (K is zero): no intrinsics."
         return Optics(track, warnings=(Remark("intrinsics-zero", sentence),))
     warnings: list[str] = []
-    if len(track.calibrations) > 1:
-        sentence = f"{track.topic} changes {len(track.calibrations) - 1} times; the first calibration is used."
+    if track.changes:
+        sentence = f"{track.topic} changes {track.changes} times; the first calibration is used."
         warnings.append(Remark("intrinsics-change", sentence))
     if rectified and any(c.camera and c.camera.is_distorted for c in track.calibrations):
         sentence = (

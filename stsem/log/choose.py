@@ -21,7 +21,7 @@ from stsem.log.topicnames import (
     SIDE_WORDS,
     TRUTH_WORDS,
 )
-from stsem.log.tracks import IMAGES, Track
+from stsem.log.tracks import Track
 
 ROLES = ("color", "depth", "pose", "labels")
 DULL_WORDS = INFRARED_WORDS | PAINTED_WORDS | OVERLAY_WORDS | NO_DEPTH_WORDS
@@ -92,9 +92,8 @@ def check_overrides(topics: Mapping[str, str], tracks: Sequence[Track]) -> dict[
             raise ChannelError(
                 f"The log has no topic {topic!r} for {role}; it has {', '.join(near) or 'no topic at all'}.", role
             )
-        kinds = (Kind.POSE, Kind.TRANSFORMS) if role == "pose" else IMAGES
-        track = max(fitting, key=lambda t: (t.kind in kinds, t.count))
-        if track.kind not in kinds:
+        track = max(fitting, key=lambda t: (_can_be(role, t), t.count))
+        if not _can_be(role, track):
             what = "poses or transforms" if role == "pose" else "images"
             raise ChannelError(
                 f"{topic} was given for {role}, which needs {what}, but it holds {track.schema or 'no schema'} "
@@ -107,6 +106,10 @@ def check_overrides(topics: Mapping[str, str], tracks: Sequence[Track]) -> dict[
             )
         chosen[role] = track
     return chosen
+
+
+def _can_be(role: str, track: Track) -> bool:
+    return track.kind in (Kind.POSE, Kind.TRANSFORMS) if role == "pose" else track.is_image
 
 
 def choose_color(images: Sequence[Candidate], everything: Sequence[Track]) -> Candidate:

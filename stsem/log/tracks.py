@@ -3,6 +3,7 @@
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,11 @@ Int64 = npt.NDArray[np.int64]
 Float64 = npt.NDArray[np.float64]
 MAX_NS = 1 << 63
 MAX_SCHEMA_BYTES = 1 << 20
-IMAGES = (Kind.IMAGE, Kind.COMPRESSED, Kind.VIDEO)
+MAX_PAIRS = 1 << 14
+"""Pairs of frames on one channel; robots have hundreds."""
+MAX_DIFFERENT = 64
+"""A camera that focuses by itself has another calibration for every image."""
+Differing = TypeVar("Differing", Calibration, ClassNames)
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,8 @@ class Track:
         out_of_order: messages whose log time is below that of the one before in the file.
         unstamped: messages without a capture stamp.
         transforms: (parent, child) -> samples.
-        calibrations, class_names: those that differ from the one before.
+        calibrations, class_names: those that differ from the one before; of many the first, and the last.
+        changes: how often one differed from the one before.
     """
 
     def __init__(self, topic: str, schema: Schema, encoding: str, damage: Damage) -> None:
@@ -84,7 +90,7 @@ class Track:
         self.row: Row | None = TABLE.get((encoding, schema.name))
         self.trouble = f"{self.topic}: {plain(why)}" if (why := why_not(encoding, schema.name)) else ""
         self.definition = schema.data
-        self.count = self.unstamped = self.out_of_order = self.largest_gap_ns = 0
+        self.count = self.unstamped = self.out_of_order = self.largest_gap_ns = self.changes = 0
         self.first_log_ns: int | None = None
         self.last_log_ns: int | None = None
         self.transforms: dict[tuple[str, str], Samples] = {}
@@ -115,6 +121,11 @@ class Track:
         """What it holds; None when stsem does not read such messages."""
         return self.row.kind if self.row else None
 
+    @property
+    def is_image(self) -> bool:
+        """Whether its messages hold pixels."""
+        return self.row is not None and self.row.kind.is_image
+
     def add(self, payload: memoryview, log_ns: int, place: int, offset: int) -> None:
         """Take in one message, in file order. An image whose stamp cannot be read stays, at its log time."""
         self._count(log_ns)
@@ -125,13 +136,13 @@ class Track:
             stamp_ns = self._take(self.row, self.decode, payload, log_ns)
         except Exception as err:  # noqa: BLE001  any error of a foreign parser means: undecodable
             self._damage.undecodable(self.topic, place, offset, str(err) or type(err).__name__)
-            if self.row.kind not in IMAGES:
+            if not self.is_image:
                 return
         if stamp_ns is None:
             self.unstamped += 1
             stamp_ns = log_ns
         _append(self._times, (stamp_ns, log_ns))
-        if self.row.kind in IMAGES:
+        if self.is_image:
             _append(self._where, (place, offset, len(payload)))
 
     def _count(self, log_ns: int) -> None:
@@ -154,21 +165,26 @@ class Track:
 
     def _read(self, message: Decoded, log_ns: int) -> int | None:
         if isinstance(message, tuple):
-            stamps = [plausible(transform.stamp_ns) for transform in message]
-            for transform in message:
-                self.transforms.setdefault((plain(transform.parent), plain(transform.child)), Samples()).add(
-                    transform, log_ns
-                )
-            return stamps[0] if stamps else None
-        if isinstance(message, Calibration) and not (self.calibrations and message.same_as(self.calibrations[-1])):
-            self.calibrations.append(message)
-        if isinstance(message, ClassNames) and [message.names] != [c.names for c in self.class_names[-1:]]:
-            self.class_names.append(message)
+            return self._read_transforms(message, log_ns)
+        if isinstance(message, Calibration):
+            self.changes += _keep(self.calibrations, message)
+        if isinstance(message, ClassNames):
+            self.changes += _keep(self.class_names, message)
         return plausible(message.stamp_ns)
+
+    def _read_transforms(self, message: tuple[Transform, ...], log_ns: int) -> int | None:
+        """Stamp of the first; of a message without any, its log time: nothing in it lacks a stamp."""
+        stamps = [plausible(transform.stamp_ns) for transform in message]
+        pairs = [(plain(transform.parent), plain(transform.child)) for transform in message]
+        if len(self.transforms) + len({pair for pair in pairs if pair not in self.transforms}) > MAX_PAIRS:
+            raise ValueError(f"there are more than {MAX_PAIRS} pairs of frames")
+        for pair, transform in zip(pairs, message, strict=True):
+            self.transforms.setdefault(pair, Samples()).add(transform, log_ns)
+        return stamps[0] if stamps else log_ns
 
     def references(self) -> References:
         """Where the images are, in order, once all have come in; other messages are not looked up again."""
-        if self.kind not in IMAGES:
+        if not self.is_image:
             return References(*(np.zeros(0, np.int64) for _ in range(5)))
         columns = stamp, log, place, offset, _ = [_as_int64(column) for column in (*self._times, *self._where)]
         order = np.lexsort((offset, place, log, stamp))
@@ -191,6 +207,17 @@ def plausible(stamp_ns: int | None) -> int | None:
     if stamp_ns is not None and not 0 < stamp_ns < MAX_NS:
         raise ValueError(f"{stamp_ns} ns is no time")
     return stamp_ns
+
+
+def _keep(kept: list[Differing], message: Differing) -> bool:
+    """Take in what differs from the last one; whether it is a change, which the first one is not."""
+    if not kept:
+        kept.append(message)
+        return False
+    if message.same_as(kept[-1]):
+        return False
+    kept[MAX_DIFFERENT - 1 :] = [message]
+    return True
 
 
 def _append(columns: "Sequence[array[int]]", values: Sequence[int]) -> None:

@@ -19,7 +19,7 @@ from stsem.log.schemas import foxglove_json, protobuf
 from stsem.log.schemas.cursor import ROS1, Cursor, cdr
 from stsem.log.schemas.messages import Kind, Transform
 from stsem.log.schemas.table import TABLE
-from stsem.log.tracks import Track
+from stsem.log.tracks import MAX_DIFFERENT, Track
 
 K = (500.0, 0.0, 320.0, 0.0, 501.0, 240.0, 0.0, 0.0, 1.0)
 LITTLE = b"\0\1\0\0"
@@ -304,6 +304,35 @@ def test_a_track_keeps_calibrations_that_differ(make: Any) -> None:
     assert got.kind is Kind.CALIBRATION
     assert [c.stamp_ns for c in got.calibrations] == [BASE_NS, BASE_NS + 3]
     assert [c.rectified is None for c in got.calibrations] == [True, False]
+
+
+def test_a_track_keeps_few_calibrations_of_many() -> None:
+    """A camera that focuses by itself: the first ones and the last, and how often it changed."""
+    make = RosMessages(2)
+    infos = [make.camera_info(BASE_NS + i, 640, 480, (400.0 + i, *K[1:])) for i in range(MAX_DIFFERENT + 10)]
+    got = fed(track(infos[0]), *infos)
+    kept = [*range(MAX_DIFFERENT - 1), MAX_DIFFERENT + 9]
+    assert [c.camera.fx for c in got.calibrations if c.camera] == [400.0 + i for i in kept]
+    assert got.changes == MAX_DIFFERENT + 9
+
+
+def test_frames_without_end_are_damage(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stsem.log.tracks.MAX_PAIRS", 4)
+    make = RosMessages(2)
+    messages = [make.tf(BASE_NS, [("world", f"{i}{j}", (0.0, 0.0, 0.0), LEVEL) for j in range(2)]) for i in range(5)]
+    damage = Damage()
+    got = Track("/tf", messages[0].schema_record(), "cdr", damage)
+    fed(got, *messages[:3], messages[0])
+    assert len(got.transforms) == 4
+    assert {len(samples) for samples in got.transforms.values()} == {1, 2}
+    assert damage.counts == {"undecodable": {"/tf": 1}}
+    assert damage.reasons["/tf"].startswith("there are more than")
+
+
+def test_a_message_without_transforms_lacks_no_stamp() -> None:
+    empty = RosMessages(2).tf(BASE_NS, [])
+    got = fed(track(empty), empty)
+    assert (got.count, got.unstamped, got.transforms) == (1, 0, {})
 
 
 def test_a_track_says_why_a_known_type_is_not_read() -> None:

@@ -89,5 +89,9 @@ class ClassNames:
     stamp_ns: int | None
     names: dict[int, str]
 
+    def same_as(self, other: "ClassNames") -> bool:
+        """Whether both name the same classes, whenever they do."""
+        return self.names == other.names
+
 
 Decoded = RawImage | CompressedImage | Calibration | tuple[Transform, ...] | ClassNames
