@@ -24,7 +24,7 @@ class FramePlan:
         stamp_ns: capture stamp of the colour image.
         color_log_ns: its log time.
         depth_log_ns: of its depth image; None without.
-        pose_log_ns: of the later of the samples that its pose is made of; None without a pose.
+        pose_log_ns: of the last to be logged of the samples that its pose is made of; None without a pose.
         truth_log_ns: of its label image; None without.
     """
 

@@ -64,6 +64,14 @@ def test_samples_may_come_in_any_order_and_twice() -> None:
     assert source.at(15 * MS).T_WC[0, 3] == pytest.approx(15)
 
 
+def test_a_pose_is_there_when_both_of_its_samples_are() -> None:
+    """Samples that overtook each other: the earlier one was logged last."""
+    samples = [(0, 90 * MS, "w", "cam", (0.0, 0.0, 0.0), LEVEL), (10 * MS, 12 * MS, "w", "cam", (1.0, 0.0, 0.0), LEVEL)]
+    source, _ = transform_chain([track("/tf", *samples)], "cam")
+    assert source is not None
+    assert [source.at(stamp * MS).log_ns // MS for stamp in (0, 5, 10)] == [90, 90, 12]
+
+
 def test_the_static_transform_that_came_last_holds() -> None:
     moving = track("/tf", *((s * MS, s * MS, "w", "base", (0.0, 0.0, 0.0), LEVEL) for s in (0, 100)))
     static = track("/tf_static", (0, 0, "base", "cam", (1, 0, 0), LEVEL), (0, 9, "base", "cam", (2, 0, 0), LEVEL))

@@ -69,7 +69,8 @@ class PoseSource:
         for edge in self.moving:
             found = edge.trajectory.brackets(stamps_ns, MAX_GAP_NS)
             known &= found.known
-            latest = np.maximum(latest, edge.log_ns[found.later])
+            # the earlier sample may be the one that came last
+            latest = np.maximum(latest, np.maximum(edge.log_ns[found.earlier], edge.log_ns[found.later]))
         return PoseTimes(known, latest)
 
     def poses(self, stamps_ns: Int64) -> Pose:
