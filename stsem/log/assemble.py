@@ -17,7 +17,7 @@ from stsem.log.choose import (
     choose_partner,
     nearest_track,
 )
-from stsem.log.classtable import ClassTable, find_table
+from stsem.log.classtable import ClassTable, find_table, read_file
 from stsem.log.container.files import File
 from stsem.log.container.store import Store
 from stsem.log.pixels import decode
@@ -189,16 +189,18 @@ def _find_optics(
 
 
 def _find_classes(result: Assembly, scan: Scan, classes_file: Path | None) -> None:
+    if result.labels is None:
+        if classes_file is not None:
+            read_file(classes_file)  # what was given is checked, used or not; what the log holds may be broken
+        return
     tables = [t for t in scan.tracks.values() if t.kind is Kind.CLASS_TABLE and t.class_names]
-    topic = result.labels.topic if result.labels else ""
+    topic = result.labels.topic
     nearest = nearest_track(tables, topic)
     messages = nearest.class_names[-1].names if nearest else None
     if nearest and nearest.changes:
         sentence = f"{nearest.topic} changes its class table {nearest.changes} times; the last one is used."
         result.warnings.append(Remark("truth-two-tables", sentence))
     table, warnings = find_table(classes_file, messages, scan.metadata, scan.attachments)
-    if result.labels is None:
-        return
     result.warnings += warnings
     result.table = table
     if table is None:

@@ -157,6 +157,7 @@ def test_labels_without_a_table_and_a_table_without_labels(recorder: Callable[..
     log = recorder("unlabelled.mcap")
     color(log, 0)
     log.writer.add_metadata("stsem.classes", {"0": "a"})
+    log.writer.add_attachment(0, 0, "classes.json", "application/json", b"{broken")  # nobody needs it
     with open_log([log.close()]) as opened:
         assert (opened.classes, opened.truth(0), opened.info.warnings) == (None, None, ())
 
