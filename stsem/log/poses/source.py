@@ -75,11 +75,7 @@ class PoseSource:
 
     def poses(self, stamps_ns: Int64) -> Pose:
         """(n, 4, 4) T_WC at `stamps_ns` (n,), all of which must be known."""
-        result = np.empty((len(stamps_ns), 4, 4))
-        for start in range(0, len(stamps_ns), BLOCK):
-            block = slice(start, start + BLOCK)
-            result[block] = compose(self.edges, stamps_ns[block])
-        return result
+        return compose(self.edges, stamps_ns)
 
     def stamps_ns(self) -> Int64:
         """Ascending union of the stamps of the moving edges."""
@@ -107,6 +103,16 @@ class PoseSource:
 
 def compose(edges: Sequence[Edge], stamps_ns: Int64) -> Pose:
     """(n, 4, 4) product of the edges at `stamps_ns` (n,); where an edge is not known, of the sample nearby."""
+    if all(edge.static for edge in edges):
+        return np.broadcast_to(_product(edges, stamps_ns[:0]), (len(stamps_ns), 4, 4))
+    result = np.empty((len(stamps_ns), 4, 4))
+    for start in range(0, len(stamps_ns), BLOCK):
+        block = slice(start, start + BLOCK)
+        result[block] = _product(edges, stamps_ns[block])
+    return result
+
+
+def _product(edges: Sequence[Edge], stamps_ns: Int64) -> Pose:
     factors = []
     for edge in edges:
         if edge.static:
@@ -115,4 +121,4 @@ def compose(edges: Sequence[Edge], stamps_ns: Int64) -> Pose:
         found = edge.trajectory.brackets(stamps_ns, MAX_GAP_NS)
         earlier = np.where(found.known, found.earlier, found.later)
         factors.append(edge.trajectory.between(stamps_ns, earlier, found.later))
-    return np.broadcast_to(reduce(np.matmul, factors, np.eye(4)), (len(stamps_ns), 4, 4))
+    return reduce(np.matmul, factors, np.eye(4))
