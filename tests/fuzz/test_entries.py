@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
 from tests.fuzz import atheris_log
 from tests.fuzz.entries import ENTRIES
@@ -24,6 +25,19 @@ def test_seeds_are_read_and_mutants_do_no_harm(name: str) -> None:
         entry(mutant(named, f"{name} {number % len(seeds)}", number).data)
     for odd in (b"", b"\0", b"\xff" * 40, bytes(200)):
         entry(odd)
+
+
+def test_two_fields_of_one_name_are_no_message_type() -> None:
+    """One repeated and one not: a list was expected where a text stood. Found by coverage."""
+    entry = ENTRIES["descriptors"]
+    (data,) = (seed for seed in entry.seeds() if b"CompressedImage" in seed and b"RawImage" not in seed)
+    files = FileDescriptorSet.FromString(data[1:])
+    (image,) = (one for file in files.file for one in file.message_type if one.name == "CompressedImage")
+    twin = image.field.add()
+    twin.CopyFrom(next(field for field in image.field if field.name == "format"))
+    twin.number, twin.label = 90, twin.LABEL_REPEATED
+    with pytest.raises(ValueError, match="two fields of one name"):
+        entry.feed(data[:1] + files.SerializeToString())
 
 
 def test_without_atheris_it_is_named(

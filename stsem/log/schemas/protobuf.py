@@ -149,11 +149,14 @@ class Messages:
         if type_name not in self._fields:
             if type_name not in self._types:
                 raise ValueError(f"{type_name[1:80]} is not described by the schema")
-            if len(self._types[type_name].field) > MAX_FIELDS_DESCRIBED:
-                raise ValueError(f"{type_name[1:80]} is described with {len(self._types[type_name].field)} fields")
+            described = self._types[type_name].field
+            if len(described) > MAX_FIELDS_DESCRIBED:
+                raise ValueError(f"{type_name[1:80]} is described with {len(described)} fields")
+            if len({field.name for field in described}) < len(described):
+                raise ValueError(f"{type_name[1:80]} is described with two fields of one name")
             self._fields[type_name] = {
                 field.number: _Field(field.name, field.type, field.type_name, field.label == Proto.LABEL_REPEATED)
-                for field in self._types[type_name].field
+                for field in described
                 if field.type in WIRE_TYPES
             }
         return self._fields[type_name]
