@@ -21,7 +21,7 @@ from stsem.report.inputs import ReportInputs, StripFrame
 from stsem.sim.trace import Marks, RunTrace, write_trace
 
 MAX_POSE_GAP_NS = 150_000_000
-BLOCK_STAMPS = 10_000
+BLOCK_STAMPS = 1_000
 _INDEX = attrgetter("index")
 
 

@@ -151,7 +151,7 @@ class IndexSet:
 
 
 class FrameTallies:
-    """Keeps the tally of every frame of one judgement.
+    """Keeps the tally of every frame of one judgement, of the classes that the frame shows: 13 bytes each.
 
     Args:
         classes: C.
@@ -162,8 +162,8 @@ class FrameTallies:
 
     def __init__(self, classes: int) -> None:
         self._classes = classes
-        self._frames, self._tallies = array("q"), array("i")
-        self._seen = IndexSet()
+        self._frames, self._seen = array("q"), IndexSet()
+        self._shown, self._ids, self._counts = bytearray(), bytearray(), array("i")
 
     def update(self, index: int, stamp_ns: int, matrix: Matrix) -> None:
         """Add the matrix (C, C + 1) of frame `index`.
@@ -175,11 +175,18 @@ class FrameTallies:
             raise ValueError(f"frame {index} was judged twice; every frame is judged once")
         self._seen.add(index)
         self._frames.extend((index, stamp_ns))
-        self._tallies.frombytes(tally(matrix).astype(np.int32).tobytes())
+        counts = tally(matrix).astype(np.int32)
+        ids = np.flatnonzero(counts.any(axis=0))
+        self._shown.append(len(ids))
+        self._ids += ids.astype(np.uint8).tobytes()
+        self._counts.frombytes(counts[:, ids].T.tobytes())
 
     def compute(self) -> Samples:
         """What bootstrap and pairing need."""
         frames = np.asarray(self._frames, np.int64).reshape(-1, 2)
         order = np.argsort(frames[:, 0])
-        tallies = np.asarray(self._tallies, np.int32).reshape(-1, 3, self._classes)
-        return Samples(frames[order, 0], frames[order, 1], tallies[order])
+        place = np.argsort(order)
+        tallies = np.zeros((len(frames), 3, self._classes), np.int32)
+        rows = np.repeat(place, np.frombuffer(self._shown, np.uint8))
+        tallies[rows, :, np.frombuffer(self._ids, np.uint8)] = np.asarray(self._counts, np.int32).reshape(-1, 3)
+        return Samples(frames[order, 0], frames[order, 1], tallies)

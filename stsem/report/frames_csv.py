@@ -10,7 +10,7 @@ from stsem.packed import IntByIndex
 from stsem.report.inputs import FrameRow, ReportInputs
 from stsem.result import STAGES
 
-BLOCK_ROWS = 10_000
+BLOCK_ROWS = 1_000
 _INTEGERS = (
     "frame", "log_stamp_ns", "stamp_ns", "arrival_ns", "taken_ns", "answered_ns", "keyframe", "distance_frames",
     "distance_ns", "latency_from_arrival_ns", "latency_from_stamp_ns", "waiting_ns", "offline_keyframe",

@@ -18,6 +18,7 @@ from mcap.writer import CompressionType, Writer
 RATE_HZ = 30
 FRAMES = 10
 """In a chunk."""
+CLASSES = 13
 
 _IMAGE, _JPEG, _POSE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "geometry_msgs/msg/PoseStamped"
 _HEAD = struct.Struct("<BQHIQQ")
@@ -85,7 +86,7 @@ class LoopingLog:
             number = writer.register_schema(schema, "ros2msg", ROS.schema(schema))
             writer.register_channel(topic, "cdr", number)
         writer.register_channel("/lidar", "bulk", writer.register_schema("Bulk", "", b""))
-        writer.add_metadata("stsem.classes", {"0": "wall", "1": "floor", "2": "door"})
+        writer.add_metadata("stsem.classes", {str(k): f"class {k}" for k in range(CLASSES)})
         return stream.getvalue()
 
     @cached_property
@@ -125,7 +126,7 @@ class LoopingLog:
         return [
             ROS.compressed(0, jpeg, "jpeg"),
             ROS.image(0, depth, "16UC1"),
-            ROS.image(0, label_picture(frame, 3, *size), "mono8"),
+            ROS.image(0, label_picture(frame, CLASSES, *size), "mono8"),
             ROS.pose(0, (0.1 * frame, 0.0, 0.0)),
             bytes(self.bulk_bytes),
         ]

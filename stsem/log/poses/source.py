@@ -16,7 +16,7 @@ from stsem.log.tracks import Int64
 from stsem.pose import Pose, Trajectory
 
 MAX_GAP_NS = 150_000_000
-BLOCK = 1 << 16
+BLOCK = 1 << 12
 """Stamps looked up at once: interpolation needs a kilobyte for each."""
 
 
