@@ -115,7 +115,7 @@ def belongs(track: Track, image: Candidate) -> bool:
     parts = tuple(part for part in track.topic.split("/") if part)
     frame_id = track.calibrations[0].frame_id
     below = bool(image.base) and parts[: len(image.base)] == image.base
-    return below or (bool(frame_id) and frame_id.lstrip("/") == image.look.frame_id.lstrip("/"))
+    return below or (bool(frame_id) and frame_id == image.look.frame_id)
 
 
 def read_optics(track: Track, image: Candidate, size: Size) -> Optics:

@@ -56,8 +56,8 @@ class ImageChannel:
         return None
 
     def look(self) -> Look:
-        """What the channel holds, told by its first readable message."""
+        """What the channel holds, told by its first readable message; its frame without the slash of ROS 1."""
         found = self.first(look)
         if found:
-            return replace(found[1], frame_id=plain(found[1].frame_id), name=plain(found[1].name))
+            return replace(found[1], frame_id=plain(found[1].frame_id.lstrip("/")), name=plain(found[1].name))
         return Look("unknown", 0, "unreadable", "")

@@ -43,8 +43,8 @@ class View:
 
     @property
     def frame_id(self) -> str:
-        """The frame that its camera looks along, without a leading slash."""
-        return self.image.look.frame_id.lstrip("/")
+        """The frame that its camera looks along."""
+        return self.image.look.frame_id
 
     def __str__(self) -> str:
         return f"{self.image.topic} ({self.size[0]}x{self.size[1]}, frame {self.frame_id!r})"
@@ -78,7 +78,7 @@ def claims_colour_pixels(depth: Candidate, size: Size, color: Candidate, color_s
     """Whether depth's pixels are said to be those of colour: by the user, by its topic, or by frame and size."""
     if registered != "auto":
         return registered == "yes"
-    same_frame = depth.look.frame_id.lstrip("/") == color.look.frame_id.lstrip("/")
+    same_frame = depth.look.frame_id == color.look.frame_id
     return bool(depth.words & ALIGNED_WORDS) or (same_frame and size == color_size)
 
 

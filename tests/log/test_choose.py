@@ -163,6 +163,10 @@ CHOICES = {
     "thermal beside colour": (
         {"/thermal/image": "mono", "/front/image": "mono"}, ("/front/image", None, None, None, None),
     ),
+    "a frame with and without the slash of ROS 1": (
+        {"/cam/image": "rgb@/eye", "/a/camera_info": "info@other", "/b/camera_info": "info@eye"},
+        ("/cam/image", None, None, None, "/b/camera_info"),
+    ),
     "the calibration of a depth camera is not that of colour": (
         {"/cam/image": "rgb", "/depth/camera_info": "info@depth"}, ("/cam/image", None, None, None, None),
     ),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from stsem.camera import Camera
 from stsem.log.schemas.messages import Calibration
+from stsem.plain import plain
 
 MODELS = {
     "plumb_bob": "plumb_bob",
@@ -71,7 +72,7 @@ def calibration(stamp_ns: int | None, frame_id: str, sensor: Intrinsics) -> Cali
     if camera:
         distortion, model = _distortion(sensor)
         camera = replace(camera, distortion=distortion, model=model)
-    return Calibration(stamp_ns, frame_id, camera, rectified)
+    return Calibration(stamp_ns, plain(frame_id.lstrip("/")), camera, rectified)
 
 
 def _sent_size(sensor: Intrinsics) -> tuple[int, int]:

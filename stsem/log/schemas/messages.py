@@ -52,7 +52,7 @@ class Calibration:
     """Intrinsics of the images as they were sent: after region of interest and binning.
 
     Args:
-        stamp_ns, frame_id: of the message.
+        stamp_ns, frame_id: of the message; the frame without the slash of ROS 1, as in transforms.
         camera: of the image as the sensor saw it, with its lens distortion; None when the message says that the camera
             is uncalibrated (K is zero).
         rectified: of the image after rectification (the left 3x3 of P), without distortion; None without a P.
