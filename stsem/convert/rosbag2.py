@@ -19,9 +19,10 @@ import zstandard
 from stsem.convert.recording import Loss
 from stsem.errors import ConversionError, OutputError
 from stsem.log.container.files import natural
+from stsem.log.container.records import MAX_RECORD_BYTES
 
 SUFFIX, PACKED_SUFFIX, METADATA = ".db3", ".db3.zstd", "metadata.yaml"
-MAX_MESSAGE_BYTES = 1 << 30
+MAX_MESSAGE_BYTES = MAX_RECORD_BYTES  # what is larger could not be read from the log
 MAX_UNPACKING = 1000
 MAX_METADATA_CHARACTERS = 16 << 20
 _ZSTD = b"\x28\xb5\x2f\xfd"
@@ -91,19 +92,33 @@ def messages(path: Path, scratch: Path) -> Iterator[Message | Loss]:
     """
     if path.with_name(f"{path.name}-wal").exists():
         yield Loss("write-ahead files (-wal) that are not read, as the recorder did not close the bag")
-    with _opened(path, scratch) as db:
+    with _opened(path, scratch) as (db, size):
         try:
-            topics = _topics(db)
-            rows = db.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY rowid")
+            topics = _topics(db, size)
+            rows = _rows(db.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY rowid"), size)
         except sqlite3.Error as err:
             raise ConversionError(f"{path} is not a ROS 2 bag in sqlite3 ({err}); give the folder of a bag.") from err
         yield from _messages(rows, topics)
 
 
-def _messages(rows: sqlite3.Cursor, topics: dict[int, Topic]) -> Iterator[Message | Loss]:
+def _rows(found: sqlite3.Cursor, size: int) -> Iterator[tuple[Any, ...]]:
+    """What was found, as long as it fits into a file of `size` bytes: columns may be made up by a formula.
+
+    Raises:
+        sqlite3.Error: it does not, or the file is damaged.
+    """
+    left = size
+    for row in found:
+        left -= sum(len(value) for value in row if isinstance(value, str | bytes))
+        if left < 0:
+            raise sqlite3.DatabaseError("it holds more than its bytes")
+        yield row
+
+
+def _messages(rows: Iterator[tuple[Any, ...]], topics: dict[int, Topic]) -> Iterator[Message | Loss]:
     while True:
         try:
-            row = rows.fetchone()
+            row = next(rows, None)
         except (sqlite3.Error, OverflowError):
             yield Loss("bag files that are damaged from some message on")
             return
@@ -136,30 +151,32 @@ def _unpacked(data: bytes) -> bytes:
         raise ValueError("messages that cannot be decompressed") from err
 
 
-def _topics(db: sqlite3.Connection) -> dict[int, Topic]:
+def _topics(db: sqlite3.Connection, size: int) -> dict[int, Topic]:
     tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     if not {"topics", "messages"} <= tables:
         raise sqlite3.DatabaseError("it has no tables of topics and messages")
     definitions: dict[str, tuple[str, str]] = {}
     if "message_definitions" in tables:
         query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-        definitions = {str(name): (str(encoding), str(text)) for name, encoding, text in db.execute(query)}
+        rows = _rows(db.execute(query), size)
+        definitions = {str(name): (str(encoding), str(text)) for name, encoding, text in rows}
     query = "SELECT id, name, type, serialization_format FROM topics"
     return {
         number: Topic(str(name), str(type_name), str(serialization), *definitions.get(str(type_name), ()))
-        for number, name, type_name, serialization in db.execute(query)
+        for number, name, type_name, serialization in _rows(db.execute(query), size)
     }
 
 
 @contextmanager
-def _opened(path: Path, scratch: Path) -> Iterator[sqlite3.Connection]:
-    """The data base, read only: nothing is written beside the bag."""
+def _opened(path: Path, scratch: Path) -> Iterator[tuple[sqlite3.Connection, int]]:
+    """The data base and its bytes, read only: nothing is written beside the bag."""
     packed = path.name.endswith(PACKED_SUFFIX)
     try:
         if packed:
             _unpack(path, scratch)
-        with closing(_connect(scratch if packed else path)) as db:
-            yield db
+        unpacked = scratch if packed else path
+        with closing(_connect(unpacked)) as db:
+            yield db, unpacked.stat().st_size
     finally:
         if packed:
             scratch.unlink(missing_ok=True)
