@@ -11,18 +11,16 @@ import numpy.typing as npt
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.convert.imagefiles import (
     Capture,
-    Truth,
     chosen,
     count,
     events,
     files,
     first_folders,
     read_text,
-    stated_truth,
-    truth_of,
     walk,
 )
 from stsem.convert.recording import Options, Recording, even_stamp_ns
+from stsem.convert.truth import Truth, stated_truth, truth_of
 from stsem.errors import ConversionError
 from stsem.log.container.files import natural
 
@@ -90,9 +88,9 @@ def read(source: Path, options: Options) -> Recording:
     ]
     labelled = sum(c.truth is not None for c in captures)
     notes = [f"{labelled} of {len(captures)} images are labelled."]
-    truth = _published_truth(source, labels, options) if published else _tutorial_truth(options)
+    truth = _published_truth(source, labels, options, notes) if published else _tutorial_truth(options, notes)
     return Recording(
-        events=events(captures, source, notes, labels=truth.labels),
+        events=events(captures, source, notes, truth=truth),
         count=count(captures),
         classes=truth.classes if labelled else None,
         notes=notes,
@@ -118,15 +116,15 @@ def _folders(source: Path) -> tuple[list[Path], list[Path], bool]:
     return [], [], False
 
 
-def _tutorial_truth(options: Options) -> Truth:
+def _tutorial_truth(options: Options, notes: list[str]) -> Truth:
     """Ids 0 to 10; 11 is unlabelled."""
-    return truth_of(options, CLASSES, {i: i for i in range(len(CLASSES))})
+    return truth_of(options, CLASSES, {i: i for i in range(len(CLASSES))}, notes)
 
 
-def _published_truth(source: Path, labels: list[Path], options: Options) -> Truth:
+def _published_truth(source: Path, labels: list[Path], options: Options, notes: list[str]) -> Truth:
     """Colours of `label_colors.txt`, or the published ones without such a file, grouped into the 11 classes."""
     if options.classes_file is not None:
-        return stated_truth(options.classes_file)
+        return stated_truth(options.classes_file, notes)
     colours = dict(PUBLISHED.values())
     near = {folder for label in labels for folder in (label, label.parent)} | {source}
     path = next((p for f in sorted(near) if (p := f / _COLOURS).is_file()), None)

@@ -21,10 +21,10 @@ from stsem.convert.imagefiles import (
     first_folders,
     image_size,
     read_text,
-    truth_of,
     walk,
 )
 from stsem.convert.recording import Options, Recording, even_stamp_ns
+from stsem.convert.truth import truth_of
 from stsem.errors import ConversionError
 from stsem.frame import Depth
 
@@ -83,10 +83,10 @@ def read(source: Path, options: Options) -> Recording:
     captures = _captures(found, options.rate_hz or RATE_HZ)
     notes = _notes(found)
     raw_ids = range(len(CLASSES)) if found.get(TRAIN_IDS) else LABEL_IDS
-    truth = truth_of(options, CLASSES, {raw: own for own, raw in enumerate(raw_ids)})
+    truth = truth_of(options, CLASSES, {raw: own for own, raw in enumerate(raw_ids)}, notes)
     camera, to_metres = _calibration(source, found, captures)
     return Recording(
-        events=events(captures, source, notes, labels=truth.labels, depth=to_metres),
+        events=events(captures, source, notes, truth=truth, depth=to_metres),
         count=count(captures),
         classes=truth.classes if any(c.truth for c in captures) else None,
         camera=camera,

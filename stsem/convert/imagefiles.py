@@ -1,21 +1,20 @@
 """Image files in folders: listed in natural order, read one by one, and nothing outside the source is opened."""
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from stsem.classes import NO_LABEL, ClassSet, Labels
+from stsem.classes import Labels
 from stsem.convert.recording import ColorEvent, DepthEvent, Event, Loss, Options, PoseEvent, TruthEvent
+from stsem.convert.truth import Truth
 from stsem.errors import ConversionError
 from stsem.frame import Depth
-from stsem.log import classtable
 from stsem.log.container.files import natural
 from stsem.log.pixels import decode, formats
 from stsem.log.schemas.messages import CompressedImage
@@ -39,14 +38,6 @@ class Capture:
     truth: Path | None = None
     depth: Path | None = None
     T_WC: Pose | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Truth:
-    """Class names, and how raw ids or colours become (H, W) uint8 labels in their order, 255 ignored."""
-
-    classes: ClassSet
-    labels: Callable[[npt.NDArray[Any]], Labels]
 
 
 def first_folders(root: Path, depth: int) -> Iterator[Path]:
@@ -123,14 +114,23 @@ def samples(data: bytes) -> npt.NDArray[Any]:
     Raises:
         ValueError: it is no png, or a broken one.
     """
-    return decode.labels(CompressedImage(None, "", "png", memoryview(data)))
+    return decode.labels(_message(data))
+
+
+def truth_labels(truth: Truth, data: bytes) -> Labels:
+    """(H, W) uint8 labels of a label image; ValueError when it cannot be read."""
+    return truth.labels(decode.labels(_message(data), truth.colour_of))
 
 
 def image_file(data: bytes) -> bytes:
     """The bytes of an image file as they came; ValueError when they do not begin like one that a log may hold."""
-    if formats.file_format(CompressedImage(None, "", "", memoryview(data))) not in IMAGE_FORMATS:
+    if formats.file_format(_message(data)) not in IMAGE_FORMATS:
         raise ValueError("it is no jpeg, png or webp")
     return data
+
+
+def _message(data: bytes) -> CompressedImage:
+    return CompressedImage(None, "", "", memoryview(data))
 
 
 def image_size(captures: Iterable[Capture], root: Path) -> tuple[int, int] | None:
@@ -138,7 +138,7 @@ def image_size(captures: Iterable[Capture], root: Path) -> tuple[int, int] | Non
     for path in (capture.color for capture in captures if capture.color is not None):
         try:
             data = read_bytes(path, root)
-            height, width = decode.colour(CompressedImage(None, "", "", memoryview(data))).shape[:2]
+            height, width = decode.colour(_message(data)).shape[:2]
         except ValueError:
             continue
         return width, height
@@ -166,43 +166,12 @@ def chosen(names: Collection[str], options: Options, source: Path) -> str:
     raise ConversionError(f"{source} has no sequence {options.sequence!r}{meant}; it has {some}.")
 
 
-def truth_of(options: Options, classes: ClassSet, raw_ids: Mapping[int, int]) -> Truth:
-    """Labels by `raw_ids`, raw id -> id in `classes`, everything else ignored; or by the user's class table.
-
-    Raises:
-        ClassTableError: the user's class table cannot be used.
-    """
-    if options.classes_file is not None:
-        return stated_truth(options.classes_file)
-    table = np.full(1 << 16, NO_LABEL, np.uint8)
-    for raw, own in raw_ids.items():
-        table[raw] = own
-
-    def labels(raw: npt.NDArray[Any]) -> Labels:
-        if raw.ndim != 2:
-            raise ValueError("it holds colours, but ids were expected")
-        return np.asarray(table[raw], np.uint8)
-
-    return Truth(classes, labels)
-
-
-def stated_truth(classes_file: Path) -> Truth:
-    """Labels by the user's class table.
-
-    Raises:
-        ClassTableError: it cannot be used.
-    """
-    table = classtable.read_file(classes_file)
-    translate = classtable.Translator(table)
-    return Truth(table.classes, lambda raw: translate(raw)[0])
-
-
 def events(
     captures: Iterable[Capture],
     root: Path,
     notes: list[str],
     *,
-    labels: Callable[[npt.NDArray[Any]], Labels] | None = None,
+    truth: Truth | None = None,
     depth: Callable[[npt.NDArray[Any]], Depth] | None = None,
 ) -> Iterator[Event]:
     """The events of all captures, one file in memory at a time; what cannot be read is a Loss.
@@ -211,13 +180,16 @@ def events(
         captures: in ascending order of stamps.
         root: the source.
         notes: gets a sentence on the first file of each kind that is lost.
-        labels, depth: from the samples of a png to labels, or to depth in metres.
+        truth: what becomes of label images; None leaves them out.
+        depth: from the samples of a png to metres; None leaves it out.
     """
     kinds: list[_Kind] = [("colour images", lambda c: c.color, lambda stamp, data: ColorEvent(stamp, image_file(data)))]
     if depth is not None:
         kinds.append(("depth images", lambda c: c.depth, lambda stamp, data: DepthEvent(stamp, depth(samples(data)))))
-    if labels is not None:
-        kinds.append(("label images", lambda c: c.truth, lambda stamp, data: TruthEvent(stamp, labels(samples(data)))))
+    if truth is not None:
+        kinds.append(
+            ("label images", lambda c: c.truth, lambda stamp, data: TruthEvent(stamp, truth_labels(truth, data)))
+        )
     return _events(captures, root, notes, kinds)
 
 

@@ -7,13 +7,14 @@ from pathlib import Path
 
 from stsem.camera import Camera
 from stsem.convert.depthfiles import metres
-from stsem.convert.imagefiles import Capture, Truth, count, events, files, read_text, stated_truth
+from stsem.convert.imagefiles import Capture, count, events, files, read_text
 from stsem.convert.lists import matrix_pose, rows, stamp_ns, stamped_pose
 from stsem.convert.names import Keys, keys_of
 from stsem.convert.nice_slam import camera_file
 from stsem.convert.recording import Loss, Options, Recording, even_stamp_ns
+from stsem.convert.truth import Truth, stated_truth, table_truth
 from stsem.errors import ConversionError
-from stsem.log.classtable import Translator, parse
+from stsem.log.classtable import parse
 from stsem.pose import Pose
 
 COLOR = ("rgb", "color", "colour", "images", "image")
@@ -69,7 +70,7 @@ def read(source: Path, options: Options) -> Recording:
     return Recording(
         events=chain(
             found.losses,
-            events(captures, source, found.notes, labels=truth.labels if truth else None, depth=to_metres),
+            events(captures, source, found.notes, truth=truth, depth=to_metres),
         ),
         count=len(found.losses) + count(captures),
         classes=truth.classes if truth and labels else None,
@@ -114,11 +115,9 @@ def _truth(found: _Found, options: Options) -> Truth | None:
         found.losses.append(Loss("label images that no class table names (--classes FILE)", count=count))
         return None
     if table.suffix.lower() != ".txt":
-        return stated_truth(table)
+        return stated_truth(table, found.notes)
     names = [line.strip() for line in read_text(table, table.parent).splitlines() if line.strip()]
-    parsed = parse(names, str(table))
-    translate = Translator(parsed)
-    return Truth(parsed.classes, lambda raw: translate(raw)[0])
+    return table_truth(parse(names, str(table)), found.notes)
 
 
 def _camera(found: _Found) -> tuple[Camera | None, float | None]:

@@ -19,11 +19,11 @@ from stsem.convert.imagefiles import (
     first_folders,
     image_size,
     read_text,
-    truth_of,
     walk,
 )
 from stsem.convert.recording import Options, Recording, even_stamp_ns
 from stsem.convert.rigid import is_rigid
+from stsem.convert.truth import Truth, truth_of
 from stsem.errors import ConversionError
 from stsem.pose import Pose
 
@@ -55,9 +55,10 @@ def read(source: Path, options: Options) -> Recording:
     poses = _poses(source, name, projection, notes)
     captures = _captures(source, sequences[name], name, options, poses)
     _count_missing(captures, bool(poses), notes)
-    truth = truth_of(options, CLASSES, {i: i for i in range(len(CLASSES))})
+    truth = truth_of(options, CLASSES, {i: i for i in range(len(CLASSES))}, notes)
+    by_red = Truth(truth.classes, lambda raw: truth.labels(_semantic(raw)))
     return Recording(
-        events=events(captures, source, notes, labels=lambda raw: truth.labels(_semantic(raw))),
+        events=events(captures, source, notes, truth=by_red),
         count=count(captures),
         classes=truth.classes if any(c.truth for c in captures) else None,
         camera=_camera(projection, image_size(captures, source)),

@@ -11,14 +11,11 @@ import numpy.typing as npt
 from stsem.convert import nyu40, sens
 from stsem.convert.depthfiles import metres
 from stsem.convert.imagefiles import (
-    Truth,
     chosen,
     files,
     image_file,
     read_bytes,
-    samples,
-    stated_truth,
-    truth_of,
+    truth_labels,
     walk,
 )
 from stsem.convert.recording import (
@@ -34,6 +31,7 @@ from stsem.convert.recording import (
     even_stamp_ns,
 )
 from stsem.convert.rigid import is_rigid
+from stsem.convert.truth import Truth, stated_truth, truth_of
 from stsem.errors import ConversionError
 from stsem.frame import Depth
 from stsem.pose import Pose, inverse
@@ -136,8 +134,8 @@ def _color_events(scan: _Scan, frame: int, stream: IO[bytes]) -> Iterator[Event]
         yield Loss("colour images that cannot be read", stamp_ns)
     if scan.truth is not None and frame in scan.labels:
         try:
-            raw = samples(read_bytes(scan.labels[frame], scan.source))
-            yield TruthEvent(stamp_ns, scan.truth.labels(raw))
+            data = read_bytes(scan.labels[frame], scan.source)
+            yield TruthEvent(stamp_ns, truth_labels(scan.truth, data))
         except ValueError:
             yield Loss("label images that cannot be read", stamp_ns)
 
@@ -245,9 +243,9 @@ def _truth(
     if not labels:
         return None, {}
     if options.classes_file is not None:
-        return stated_truth(options.classes_file), labels
+        return stated_truth(options.classes_file, notes), labels
     table = next((p for folder in (path.parent, source) if (p := folder / TABLE).is_file()), None)
     if table is None:
         notes.append(f"{LABELS} is left out: {TABLE}, which gives its ids their classes, is not in {source}.")
         return None, {}
-    return truth_of(options, nyu40.CLASSES, nyu40.raw_ids(table, source)), labels
+    return truth_of(options, nyu40.CLASSES, nyu40.raw_ids(table, source), notes), labels

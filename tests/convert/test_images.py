@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_up_images import HEIGHT, WIDTH, convert, encoded, pose, rgb, write
+from PIL import Image as PilImage
 
 from stsem.convert import images
 from stsem.convert.names import keys_of
@@ -53,6 +54,32 @@ def test_everything_is_found_and_paired_by_number(tmp_path: Path) -> None:
             np.testing.assert_array_equal(frame.depth, np.full((HEIGHT, WIDTH), np.float32((1500 + k) / 1000)))
             np.testing.assert_array_equal(log.truth(k), truth(k))
             np.testing.assert_allclose(frame.T_WC, pose(k), atol=1e-9)
+
+
+def test_labels_outside_the_class_table_are_counted(tmp_path: Path) -> None:
+    """One pixel in the second image, two in the third; 255 is no news."""
+    root = folder(tmp_path / "walk", 3)
+    for k in (1, 2):
+        labels = truth(k)
+        labels[1, :k] = 9
+        write(root / f"labels/{k}.png", labels)
+    converted = convert(images.read, root, tmp_path / "log.mcap", Options(rate_hz=15))
+    said = "3 pixels in 2 label images have an id or colour outside the class table: ignored."
+    assert [note for note in converted.summary.notes if "class table" in note] == [said]
+    assert not converted.summary.losses
+    with converted.log as log:
+        assert log.truth(2)[1, :3].tolist() == [255, 255, truth(2)[1, 2]]
+
+
+def test_a_palette_in_the_colours_of_the_classes_is_one_of_colours(tmp_path: Path) -> None:
+    """As in a recorded log: the indices of such a png mean nothing."""
+    root = folder(tmp_path / "walk", 1)
+    write(root / "classes.json", json.dumps({"names": NAMES, "colours": [[9, 0, 0], [0, 9, 0], [0, 0, 9]]}))
+    painted = PilImage.fromarray(np.minimum(truth(0), 2), "P")
+    painted.putpalette([0, 0, 9, 0, 9, 0, 9, 0, 0])
+    painted.save(root / "labels/0.png")
+    with convert(images.read, root, tmp_path / "log.mcap", Options(rate_hz=15)).log as log:
+        np.testing.assert_array_equal(log.truth(0), 2 - np.minimum(truth(0), 2))
 
 
 def test_the_largest_sample_of_depth_is_unknown_as_in_a_log(tmp_path: Path) -> None:
