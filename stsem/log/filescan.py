@@ -4,6 +4,7 @@ import zlib
 from array import array
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 
 from mcap.opcode import Opcode
 
@@ -22,6 +23,10 @@ from stsem.plain import plain
 
 MAX_TABLE_BYTES = 1 << 22
 MAX_HOMELESS = 1 << 22
+MAX_WRONG = 1000
+"""Behind so many records that are none the rest of a chunk is not looked at."""
+MIN_RECORDS = 1 << 12
+"""A chunk may have so many records, and one more for each of its bytes in the file: log times alone pack no tighter."""
 
 
 class FileScan:
@@ -98,7 +103,7 @@ class FileScan:
         """All records of a chunk."""
         view, found, end, wrong = memoryview(records), _Found(), 0, 0
         before = self._result.message_bytes
-        for opcode, start, end in _records(records):
+        for opcode, start, end in islice(_records(records), MIN_RECORDS + chunk.length):
             body = view[start:end]
             if opcode == Opcode.MESSAGE and len(body) >= MESSAGE_HEAD.size:
                 channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(body)
@@ -108,6 +113,8 @@ class FileScan:
                 self._read(_DEFINES[opcode], body, in_summary=False)
             else:
                 wrong += 1
+                if wrong >= MAX_WRONG:
+                    break
         wrong += end != len(records)
         self._damage.count("bad_record", n=wrong)
         if found:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 from made_up_logs import BASE_NS, ROS, Recorder, picture, room
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
@@ -17,6 +18,7 @@ from stsem.log.container.files import find_files
 from stsem.log.container.fingerprint import Fingerprint
 from stsem.log.container.records import BLOCK, FRAME, MAGIC
 from stsem.log.container.store import Store
+from stsem.log.filescan import MIN_RECORDS
 from stsem.log.scan import Scan, scan
 
 IMAGE = "sensor_msgs/msg/Image"
@@ -209,6 +211,27 @@ def test_a_chunk_that_states_a_monstrous_size_is_not_believed(room_log: Path) ->
         path = room_log.with_name("bomb.mcap")
         path.write_bytes(data)
         assert scanned(path).damage.counts["chunk_unreadable"] == {"": 1}
+
+
+@pytest.mark.parametrize(
+    ("record", "kind"),
+    [
+        (bytes(FRAME.size), "bad_record"),
+        (FRAME.pack(Opcode.SCHEMA, 14) + bytes(14), "bad_record"),
+        (FRAME.pack(Opcode.MESSAGE, 22) + bytes(22), "unknown_channel"),
+    ],
+    ids=["nothing", "schemas", "messages"],
+)
+def test_a_chunk_of_some_kilobytes_is_not_a_million_records(tmp_path: Path, record: bytes, kind: str) -> None:
+    """What is looked at is in proportion to the bytes in the file, not to what they unpack to."""
+    content = record * 400_000
+    packed = zstandard.ZstdCompressor().compress(content)
+    body = struct.pack("<QQQI", 0, 0, len(content), 0) + struct.pack("<I4sQ", 4, b"zstd", len(packed)) + packed
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(MAGIC + FRAME.pack(Opcode.HEADER, 8) + bytes(8) + FRAME.pack(Opcode.CHUNK, len(body)) + body)
+    found = scanned(path).damage.counts
+    assert 0 < sum(found[kind].values()) <= MIN_RECORDS + len(packed) + 2
+    assert found["bad_record"]
 
 
 def test_channels_lost_with_their_chunk_are_taken_from_the_summary(room_log: Path) -> None:
