@@ -9,7 +9,7 @@ from stsem.convert.lists import stamp_ns
 
 _UNITS_NS = {19: 1, 16: 1_000, 13: 1_000_000}
 """Digits of a whole number since 1970, in 2001 to 2286 -> its unit in nanoseconds."""
-_SECONDS = re.compile(r"\d{10}(\.\d+)?")
+_SECONDS = re.compile(r"\d{10}(\.\d+)?", re.ASCII)
 _LAST_NUMBER = re.compile(r"(\d{1,18})\D*$")
 
 
@@ -46,7 +46,12 @@ def keys_of(images: Sequence[Path]) -> Keys:
 
 
 def _stamp(stem: str) -> int | None:
-    """Nanoseconds of seconds (ten digits, with or without decimals), or of 13, 16 or 19 digits."""
+    """Nanoseconds of seconds (ten digits, with or without decimals), or of 13, 16 or 19 digits.
+
+    A number filled up with zeros (0000000007 in KITTI) counts images.
+    """
+    if stem.startswith("0"):
+        return None
     if _SECONDS.fullmatch(stem):
         try:
             return stamp_ns(stem)

@@ -115,6 +115,12 @@ def test_stamps_in_names_are_taken(tmp_path: Path, names: list[str], stamps: lis
         np.testing.assert_allclose(log.frame(1, depth=False, previous=False).T_WC, pose(1), atol=1e-9)
 
 
+@pytest.mark.parametrize("digits", [10, 13, 16, 19])
+def test_numbers_filled_up_with_zeros_are_no_stamps(digits: int) -> None:
+    found = keys_of([Path(f"{k:0{digits}d}.png") for k in range(12)])
+    assert (found.kind, list(found.files)) == ("number", list(range(12)))
+
+
 def test_one_name_without_a_stamp_makes_all_numbers(tmp_path: Path) -> None:
     assert keys_of([Path("1700000000125.png"), Path("frame7.png")]).kind == "number"
     assert keys_of([Path("a1.png"), Path("b1.png")]).kind == "name"
