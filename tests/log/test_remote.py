@@ -245,6 +245,8 @@ def test_local_paths_never_touch_the_network(room_log: Path, monkeypatch: pytest
         ("https://u:p@ss@host/b%20c.mcap", "https://host/b%20c.mcap", "b c.mcap"),
         ("/tmp/a?b@c:d.mcap", "/tmp/a?b@c:d.mcap", "a?b@c:d.mcap"),
         ("zip://in/a.mcap::https://u:p@host/b.zip?t=1", "zip://in/a.mcap::https://host/b.zip", "a.mcap"),
+        ("simplecache::https://u:p@host/b.mcap?t=1", "simplecache::https://host/b.mcap", "b.mcap"),
+        ("http://u:p@[fe80::a:1]:80/b.mcap?t=1", "http://[fe80::a:1]:80/b.mcap", "b.mcap"),
         ("https://user:p?w@host/b.mcap", "https://user", "user"),
     ],
 )

@@ -10,6 +10,8 @@ from urllib.parse import unquote, urlsplit
 from stsem.errors import LogError
 
 _URL = re.compile(r"([A-Za-z][\w+.-]*::)*[A-Za-z][\w+.-]*://")
+_LINKS = re.compile(r"::(?=[A-Za-z][\w+.-]*:(?:/|:[A-Za-z]))")
+"""Between the addresses of a chain (simplecache::s3://...), and not within that of a host ([::1])."""
 
 
 class Source(Protocol):
@@ -106,18 +108,20 @@ def shown_name(given: Path | str) -> str:
     """The last part of the path that `given` means, for people: unquoted, without query."""
     if not is_url(given):
         return local_path(given).name
-    bare = without_secrets(str(given)).split("::")[0]
+    bare = next(part for part in _LINKS.split(without_secrets(str(given))) if "://" in part)
     last = bare.partition("://")[2].rstrip("/").rpartition("/")[2]
     return unquote(last) if bare.lower().startswith("http") else last
 
 
 def without_secrets(text: str) -> str:
     """`text` without `user:password@`, query and fragment if it is an address; other texts as they are."""
-    return "::".join(map(_bare, text.split("::"))) if is_url(text) else text
+    return "::".join(map(_bare, _LINKS.split(text))) if is_url(text) else text
 
 
 def _bare(address: str) -> str:
     scheme, mark, rest = address.partition("://")
     host, slash, path = re.split(r"[?#]", rest, maxsplit=1)[0].partition("/")
-    host = re.sub(r":(?!\d+$).*", "", host.rpartition("@")[2])
+    host = host.rpartition("@")[2]
+    if not host.startswith("["):  # an address of numbers
+        host = re.sub(r":(?!\d+$).*", "", host)
     return f"{scheme}{mark}{host}{slash}{path}"
