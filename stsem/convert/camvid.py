@@ -88,6 +88,9 @@ def read(source: Path, options: Options) -> Recording:
     ]
     labelled = sum(c.truth is not None for c in captures)
     notes = [f"{labelled} of {len(captures)} images are labelled."]
+    named = sum(bool((match := _NAME.fullmatch(stem)) and match["sequence"] == name) for stem in annotations)
+    if named > labelled:
+        notes.append(f"{named - labelled} label images belong to no colour image: left out.")
     truth = _published_truth(source, labels, options, notes) if published else _tutorial_truth(options, notes)
     return Recording(
         events=events(captures, source, notes, truth=truth),

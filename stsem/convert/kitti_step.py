@@ -53,7 +53,7 @@ def read(source: Path, options: Options) -> Recording:
     notes: list[str] = []
     projection = _projection(source, name, notes)
     poses = _poses(source, name, projection, notes)
-    captures = _captures(source, sequences[name], name, options, poses)
+    captures = _captures(source, sequences[name], name, options, poses, notes)
     _count_missing(captures, bool(poses), notes)
     truth = truth_of(options, CLASSES, {i: i for i in range(len(CLASSES))}, notes)
     by_red = Truth(truth.classes, lambda raw: truth.labels(_semantic(raw)))
@@ -76,7 +76,7 @@ def _sequences(source: Path) -> dict[str, Path]:
 
 
 def _captures(
-    source: Path, images: Path, name: str, options: Options, poses: Mapping[int, Pose]
+    source: Path, images: Path, name: str, options: Options, poses: Mapping[int, Pose], notes: list[str]
 ) -> list[Capture]:  # fmt: skip
     maps: dict[str, Path] = {}
     for folder in walk(source, _LEVELS + 1):
@@ -84,6 +84,8 @@ def _captures(
             maps |= {path.stem: path for path in files(folder, (".png",))}
     rate = options.rate_hz or RATE_HZ
     paths = files(images)
+    if astray := len(maps.keys() - {path.stem for path in paths}):
+        notes.append(f"{astray} label images belong to no colour image: left out.")
     numbered = all(path.stem.isdecimal() for path in paths)
     numbers = [int(path.stem) for path in paths] if numbered else range(len(paths))
     return [

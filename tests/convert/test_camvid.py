@@ -127,6 +127,17 @@ def test_images_without_labels_are_counted(tmp_path: Path) -> None:
     assert recording.notes == ["3 of 4 images are labelled."]
 
 
+def test_labels_without_images_are_counted(tmp_path: Path) -> None:
+    """Those of this sequence."""
+    source = tutorial(tmp_path)
+    (source / f"train/0001TP_{FRAMES[0]:06}.png").unlink()
+    (source / "test/Seq05VD_f00000.png").unlink()
+    assert read(source, Options(sequence="0001TP")).notes == [
+        "2 of 2 images are labelled.",
+        "1 label images belong to no colour image: left out.",
+    ]
+
+
 def test_broken_images_are_counted(tmp_path: Path) -> None:
     source = published(tmp_path)
     write(source / f"LabeledApproved_full/0001TP_{FRAMES[0]:06}_L.png", ids(0))

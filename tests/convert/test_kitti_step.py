@@ -89,12 +89,14 @@ def test_without_calib_poses_and_maps(tmp_path: Path) -> None:
     for k in (0, 2):
         write(tmp_path / f"image_02/0000/{k:06}.png", rgb(k))
     write(tmp_path / "panoptic_maps/val/0000/000002.png", panoptic(2))
+    write(tmp_path / "panoptic_maps/val/0000/000003.png", panoptic(3))
     recording = read(tmp_path, Options())
     events = list(recording.events)
     assert [type(e) for e in events] == [ColorEvent, ColorEvent, TruthEvent]
     assert recording.camera is None
     assert recording.notes == [
         "There is no calib/0000.txt: the log has no intrinsics.",
+        "1 label images belong to no colour image: left out.",
         "1 of 2 images have no label image.",
     ]
 
