@@ -29,6 +29,8 @@ from stsem.errors import ConversionError
 from stsem.frame import Depth
 
 RATE_HZ = 17.0
+PUBLISHED_SIZE = (2048, 1024)
+"""Width and height that the camera files are for; images may have been made smaller."""
 _LEVELS = 3
 
 CLASSES = ClassSet(
@@ -143,7 +145,7 @@ def _calibration(
             "mend or remove the file."
         )
     size = image_size(captures, source)
-    camera = Camera(*size, fx, fy, cx, cy) if size else None
+    camera = Camera(*PUBLISHED_SIZE, fx, fy, cx, cy).scaled(*size) if size else None
     return camera, lambda raw: _metres(raw, abs(baseline) * fx)
 
 

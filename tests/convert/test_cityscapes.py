@@ -76,7 +76,9 @@ def test_a_snippet_comes_through_exactly(tmp_path: Path, kind: str) -> None:
     frame = log.frame(19, depth=True, previous=False)
     np.testing.assert_array_equal(frame.depth, metres(19))
     assert log.camera is not None
-    assert (log.camera.fx, log.camera.cx, log.camera.width) == (2262.52, 1096.98, WIDTH)
+    shrunk = WIDTH / 2048
+    assert (log.camera.fx, log.camera.width) == (2262.52 * shrunk, WIDTH)
+    assert log.camera.cx == pytest.approx((1096.98 + 0.5) * shrunk - 0.5, abs=1e-12)
     assert not converted.summary.losses
     assert "1 of 30 images are labelled." in converted.summary.notes
 
