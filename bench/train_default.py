@@ -24,7 +24,7 @@ from stsem.inference.sidecar import Difference, Sidecar
 from stsem.inference.threads import set_threads
 from stsem.log.log import open_log
 from stsem.metrics.confusion import ConfusionMatrix
-from stsem.models.two_stream import fuse
+from stsem.models.two_stream import PredictionFusion, prediction_sum
 from stsem.synth.vocabulary import OFFICE
 from stsem.train.augment import Augmentation
 from stsem.train.dataset import PairFolder, class_shares
@@ -118,13 +118,15 @@ def _streams(args: argparse.Namespace) -> None:
     """The fused answer beside each stream's own, in torch."""
     torch.set_num_threads(args.threads)
     network, sidecar = load_checkpoint(args.checkpoint, len(OFFICE)), _sidecar(tuple(args.size))
+    assert isinstance(network, PredictionFusion)
     matrices = {name: ConfusionMatrix(len(OFFICE)) for name in ("fused", "colour", "difference")}
     for image, previous, truth in _samples(args):
         inputs = {name: torch.from_numpy(value) for name, value in network_inputs(image, previous, sidecar).items()}
         with torch.no_grad():
-            logits = [network.colour(inputs["image"]), network.difference(inputs["difference"])]
-        colour, difference = (each.softmax(1) for each in logits)
-        for name, probabilities in zip(matrices, (fuse(*logits), colour, difference), strict=True):
+            colour = network.colour(inputs["image"]).softmax(1)
+            difference = network.difference(inputs["difference"]).softmax(1)
+        fused = prediction_sum(colour, difference)
+        for name, probabilities in zip(matrices, (fused, colour, difference), strict=True):
             full = interpolate(probabilities, size=tuple(args.size)[::-1], mode="bilinear", align_corners=True)
             labels = full.argmax(1)[0].to(torch.uint8).numpy()
             matrices[name].update(truth, labels_at(labels, (image.shape[1], image.shape[0])))

@@ -3,6 +3,7 @@
 import logging
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,47 +11,78 @@ import numpy.typing as npt
 import onnx
 import onnxruntime
 import torch
+from torch import nn
+from torch.nn import functional
 
 from stsem.errors import NetworkError, OutputError
-from stsem.models.pspnet import fits
-from stsem.models.two_stream import Answer, OneStream, TwoStream
+from stsem.models.montecarlo import MAPS, fix_masks, uncertainty
+from stsem.models.network import CHANNELS, SegmentationNetwork
 
 OPSET = 18
-AGREEMENT = 0.9999
-"""Smallest share of labels that must be equal in torch and in the exported graph."""
-
 Tensor = npt.NDArray[np.float32]
 
 
+class Answer(nn.Module):
+    """What is exported: a network's probabilities, upsampled, as labels and confidence at the input's size.
+
+    Probabilities are enlarged rather than logits: bilinear weights keep their sum at 1, so the largest is a confidence.
+
+    Args:
+        network: in evaluation mode; from `fix_masks` when there are passes.
+        passes: of Monte Carlo dropout, which add the maps of `MAPS`; labels and confidence stay those without dropout.
+    """
+
+    def __init__(self, network: SegmentationNetwork, *, passes: int = 0) -> None:
+        super().__init__()
+        self.network = network
+        self._passes = passes
+
+    def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        """Inputs as `input_names` lists them, batch 1 -> labels (1, H, W) uint8, confidence and maps (1, H, W) float32.
+
+        Without passes any batch will do.
+        """
+        named = dict(zip(input_names(self.network), inputs, strict=True))
+        features = self.network.features(*(named[name] for name in self.network.inputs))
+        maps = uncertainty(self.network, *features, passes=self._passes) if self._passes else ()
+        full, *wide = (
+            functional.interpolate(x, size=inputs[0].shape[-2:], mode="bilinear", align_corners=True)
+            for x in (self.network.head(*features), *maps)
+        )
+        confidence, labels = torch.max(full, 1)
+        return (labels.to(torch.uint8), confidence, *(x[:, 0] for x in wide))
+
+
+def input_names(network: SegmentationNetwork) -> list[str]:
+    """Inputs of the exported graph: the image, used or not, comes first."""
+    return ["image", *(name for name in network.inputs if name != "image")]
+
+
 def export_onnx(
-    network: TwoStream | OneStream, path: Path, *, size: tuple[int, int], metadata: Mapping[str, str]
+    network: SegmentationNetwork, path: Path, *, size: tuple[int, int], metadata: Mapping[str, str], passes: int = 0
 ) -> None:
     """Write `network` for inputs of `size` to `path`, one file; same weights and versions, same bytes.
 
     Args:
         network: put into evaluation mode here.
         path: the ONNX file; its folder must exist.
-        size: (width, height), both 48 k - 7, so that every pool is a fixed one.
+        size: (width, height).
         metadata: strings to keep in the file.
+        passes: of Monte Carlo dropout with masks that become constants of the graph; it then also gives `MAPS`.
 
     Raises:
-        NetworkError: the size does not fit the pyramid.
+        NetworkError: the size does not fit the network, or it has no dropout to sample.
         OutputError: the file cannot be written.
     """
-    for side in size:
-        if not fits(side):
-            nearest = max(1, round((side + 7) / 48)) * 48 - 7
-            raise NetworkError(f"The input size {size[0]}x{size[1]} does not fit the pyramid: {side} is not 48 k - 7; "
-                               f"use {nearest}.")  # fmt: skip
-    answer = Answer(network.eval()).eval()
-    inputs = _input_names(network)
-    example = tuple(torch.zeros(1, 3, size[1], size[0]) for _ in inputs)
+    _check_size(network, size)
+    names = input_names(network.eval())
+    example = tuple(torch.zeros(1, CHANNELS[name], size[1], size[0]) for name in names)
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it mentions torchvision, which nothing here needs
     with warnings.catch_warnings(), torch.no_grad():
         warnings.simplefilter("ignore")  # torch's exporter deprecates its own internals
         program = torch.onnx.export(
-            answer, example, dynamo=True, external_data=False, opset_version=OPSET, verbose=False,
-            input_names=inputs, output_names=["labels", "confidence"],
+            answer_of(network, size, passes), example, dynamo=True, external_data=False, opset_version=OPSET,
+            verbose=False, input_names=names, output_names=["labels", "confidence", *(MAPS if passes else ())],
         )  # fmt: skip
     if program is None:
         raise NetworkError(f"torch could not export the network to {path}.")
@@ -63,23 +95,59 @@ def export_onnx(
         raise OutputError(f"The network cannot be written to {path}: {err.strerror}.") from err
 
 
-def agreement(network: TwoStream | OneStream, path: Path, inputs: Mapping[str, Tensor]) -> float:
-    """Share of labels that the file and torch give alike.
+def answer_of(network: SegmentationNetwork, size: tuple[int, int], passes: int = 0) -> Answer:
+    """What is exported of a network in evaluation mode, for inputs of `size` (width, height)."""
+    if passes:
+        zeros = (torch.zeros(1, CHANNELS[name], size[1], size[0]) for name in network.inputs)
+        network = fix_masks(network, *zeros, passes=passes)
+    return Answer(network, passes=passes).eval()
+
+
+def _check_size(network: SegmentationNetwork, size: tuple[int, int]) -> None:
+    for side in size:
+        if not network.fits(side):
+            raise NetworkError(f"The input size {size[0]}x{size[1]} does not fit the network: {side} is not "
+                               f"{network.side_rule}; use {network.nearest_side(side)}.")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How alike a file and torch answer.
+
+    Args:
+        labels: share of labels that are equal.
+        largest: largest difference of confidence or of a map.
+    """
+
+    labels: float
+    largest: float
+
+    SHARE = 0.9999
+    DIFFERENCE = 1e-4
+
+    @property
+    def holds(self) -> bool:
+        """Whether they are the same up to rounding: at least SHARE of the labels, and everything else to DIFFERENCE."""
+        return self.labels >= self.SHARE and self.largest <= self.DIFFERENCE
+
+
+def agreement(network: SegmentationNetwork, path: Path, inputs: Mapping[str, Tensor], passes: int = 0) -> Agreement:
+    """Compare an exported file with torch.
 
     Args:
         network: what `path` was exported from.
         path: the ONNX file.
-        inputs: by name, each (1, 3, H, W) float32.
+        inputs: by name, each (1, channels, H, W) float32.
+        passes: as it was exported.
     """
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
-    exported = session.run(["labels"], dict(inputs))[0]
+    labels, *others = session.run(None, dict(inputs))
+    height, width = inputs["image"].shape[-2:]
     with torch.no_grad():
-        eager, _ = Answer(network.eval())(*(torch.from_numpy(inputs[name]) for name in _input_names(network)))
-    return float((exported == eager.numpy()).mean())
-
-
-def _input_names(network: TwoStream | OneStream) -> list[str]:
-    return ["image", "difference"] if isinstance(network, TwoStream) else ["image"]
+        tensors = (torch.from_numpy(inputs[name]) for name in input_names(network))
+        eager, *expected = answer_of(network.eval(), (width, height), passes)(*tensors)
+    largest = max(float(np.abs(x - y.numpy()).max()) for x, y in zip(others, expected, strict=True))
+    return Agreement(float((labels == eager.numpy()).mean()), largest)
 
 
 def _forget_origins(model: onnx.ModelProto) -> None:

@@ -7,16 +7,19 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from stsem.models.resnet import STRIDE, ResNet, ResNetSpec, conv_bn
+from stsem.models.resnet import ResNet, ResNetSpec, conv_bn
 
 BINS = (1, 2, 3, 6)
 DROPOUT = 0.1
+AUXILIARY = 0.4
+"""Weight of the auxiliary head's loss (section 3.3)."""
 NARROWEST_HEAD = 64
+SIDE_RULE = "48 k - 7"
 
 
-def fits(side: int) -> bool:
-    """Whether the grid of an input side divides by every bin: side = 48 k - 7 (473, 521, 569, ...)."""
-    return side > 0 and (side + 7) % (STRIDE * max(BINS)) == 0
+def nearest_side(side: int) -> int:
+    """The nearest side whose grid (side - 1) / 8 + 1 divides by every bin: 48 k - 7 (473, 521, 569, ...)."""
+    return max(1, round((side + 7) / 48)) * 48 - 7
 
 
 class PyramidPooling(nn.Module):
@@ -58,13 +61,15 @@ class PSPNet(nn.Module):
     Args:
         spec: backbone.
         classes: number of classes C.
+        head: False for a stream that is joined with another one before its head.
     """
 
-    def __init__(self, spec: ResNetSpec, classes: int) -> None:
+    def __init__(self, spec: ResNetSpec, classes: int, *, head: bool = True) -> None:
         super().__init__()
         self.backbone = ResNet(spec)
         self.pyramid = PyramidPooling(self.backbone.channels)
-        self.head = _head(self.pyramid.channels, max(NARROWEST_HEAD, self.backbone.channels // 4), classes)
+        if head:
+            self.head = final_head(self.pyramid.channels, classes)
         self.auxiliary = _head(self.backbone.middle_channels, max(NARROWEST_HEAD, self.backbone.channels // 8), classes)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -72,13 +77,33 @@ class PSPNet(nn.Module):
         logits: Tensor = self.head(self.pyramid(self.backbone(x)[1]))
         return logits
 
-    def forward_with_auxiliary(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits of the head and of the auxiliary head, both (B, C, h, w); for training."""
+    def pooled(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """The final feature map behind the pyramid, and the logits of the auxiliary head."""
         middle, late = self.backbone(x)
-        return self.head(self.pyramid(late)), self.auxiliary(middle)
+        return self.pyramid(late), self.auxiliary(middle)
+
+
+def final_head(channels: int, classes: int) -> nn.Sequential:
+    """What follows the pyramid of `channels`, twice the backbone's."""
+    return _head(channels, max(NARROWEST_HEAD, channels // 8), classes)
 
 
 def _head(cin: int, channels: int, classes: int) -> nn.Sequential:
     return nn.Sequential(
         *conv_bn(cin, channels, 3), nn.ReLU(inplace=True), nn.Dropout2d(DROPOUT), nn.Conv2d(channels, classes, 1)
     )
+
+
+def before_dropout(head: nn.Sequential, x: Tensor) -> Tensor:
+    """The part of a head that Monte Carlo dropout runs once."""
+    out: Tensor = head[:_FIRST_DROPOUT](x)
+    return out
+
+
+def from_dropout(head: nn.Sequential, x: Tensor) -> Tensor:
+    """The rest: dropout and classifier."""
+    out: Tensor = head[_FIRST_DROPOUT:](x)
+    return out
+
+
+_FIRST_DROPOUT = 3

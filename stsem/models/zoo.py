@@ -1,44 +1,112 @@
-"""The networks that can be built by name: one row each."""
+"""The networks that can be built by name: one row each.
 
+A name may end in a width, in sixteenths of the paper's channels: `pspnet-r18-sum-w4` has a quarter of them. Networks of
+two streams take two: `pspnet-r18-sum-w4-w2`, colour first.
+"""
+
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from stsem.errors import UsageError
+from stsem.models.network import SegmentationNetwork
 from stsem.models.resnet import ResNetSpec
-from stsem.models.two_stream import OneStream, TwoStream
+from stsem.models.two_stream import FeatureFusion, OneStream, PredictionFusion, prediction_max, prediction_sum
+
+SIXTEENTHS = 16
 
 
 @dataclass(frozen=True)
-class Architecture:
-    """Shapes of a network's streams; no difference stream means the spatial network alone."""
+class Paper:
+    """Where a network is defined: authors and year, title, and the figure or section to read beside the code."""
 
-    colour: ResNetSpec
-    difference: ResNetSpec | None
-
-
-def _both(spec: ResNetSpec) -> Architecture:
-    return Architecture(spec, spec)
+    authors: str
+    title: str
+    figure: str
 
 
-ARCHITECTURES: dict[str, Architecture] = {
-    "pspnet-r50": _both(ResNetSpec(50)),  # the paper's
-    "pspnet-r18": _both(ResNetSpec(18)),
-    "pspnet-r18-w4": _both(ResNetSpec(18, 4 / 16)),  # width in sixteenths
-    "pspnet-r18-w4-w2": Architecture(ResNetSpec(18, 4 / 16), ResNetSpec(18, 2 / 16)),  # the shipped one
-    "pspnet-r18-w6-w4": Architecture(ResNetSpec(18, 6 / 16), ResNetSpec(18, 4 / 16)),
-    "pspnet-r50-spatial": Architecture(ResNetSpec(50), None),
-    "pspnet-r18-spatial": Architecture(ResNetSpec(18), None),
-}
+@dataclass(frozen=True)
+class Row:
+    """One network.
+
+    Args:
+        paper: its definition.
+        build: called with the number of classes and a width factor for each of `widths`; random weights.
+        widths: how many width factors there are.
+    """
+
+    paper: Paper
+    build: Callable[..., SegmentationNetwork]
+    widths: int = 1
 
 
-def build(name: str, classes: int) -> TwoStream | OneStream:
+_PSPNET = Paper("Zhao et al. 2016", "Pyramid Scene Parsing Network", "figure 3")
+
+
+def _paper(how: str) -> Paper:
+    return Paper("the paper", "Semantic Scene Mapping with Spatio-temporal Deep Neural Network", f"figure 3, {how}")
+
+
+def _spatial(depth: int, classes: int, width: float) -> OneStream:
+    return OneStream(ResNetSpec(depth, width), classes)
+
+
+def _temporal(depth: int, classes: int, width: float) -> OneStream:
+    return OneStream(ResNetSpec(depth, width), classes, stream="difference")
+
+
+def _two(make: Callable[..., SegmentationNetwork], depth: int, classes: int, *widths: float) -> SegmentationNetwork:
+    return make(*(ResNetSpec(depth, width) for width in widths), classes)
+
+
+def _pspnets(depth: int) -> dict[str, Row]:
+    fusions: dict[str, tuple[str, Callable[..., SegmentationNetwork]]] = {
+        "sum": ("prediction SUM", partial(PredictionFusion, fuse=prediction_sum)),
+        "max": ("prediction MAX", partial(PredictionFusion, fuse=prediction_max)),
+        "feature-sum": ("feature map SUM", partial(FeatureFusion, join="sum")),
+        "feature-concat": ("feature map concatenation", partial(FeatureFusion, join="concat")),
+    }
+    rows = {
+        "spatial": Row(_PSPNET, partial(_spatial, depth)),
+        "temporal": Row(_paper("temporal stream"), partial(_temporal, depth)),
+    }
+    rows |= {name: Row(_paper(how), partial(_two, make, depth), 2) for name, (how, make) in fusions.items()}
+    return {f"pspnet-r{depth}-{name}": row for name, row in rows.items()}
+
+
+ZOO: dict[str, Row] = {
+    **_pspnets(18), **_pspnets(50), **_pspnets(101),
+}  # fmt: skip
+ALIASES = {f"pspnet-r{depth}": f"pspnet-r{depth}-sum" for depth in (18, 50, 101)}
+"""The paper's best fusion needs no name."""
+
+
+def build(name: str, classes: int) -> SegmentationNetwork:
     """A network with random weights (torch's default initialisation; set the seed first).
 
+    Args:
+        name: a row of `ZOO` or `ALIASES`, with or without widths.
+        classes: number of classes C.
+
     Raises:
-        UsageError: `name` is not in `ARCHITECTURES`.
+        UsageError: there is no such row, or it takes fewer widths.
     """
-    if name not in ARCHITECTURES:
-        raise UsageError(f"There is no architecture {name!r}; choose one of {', '.join(ARCHITECTURES)}.")
-    row = ARCHITECTURES[name]
-    if row.difference is None:
-        return OneStream(row.colour, classes)
-    return TwoStream(row.colour, row.difference, classes)
+    row, widths = find(name)
+    return row.build(classes, *widths)
+
+
+def find(name: str) -> tuple[Row, tuple[float, ...]]:
+    """The row of a name, and its width factors. Raises UsageError as `build` does."""
+    base, suffix = _NAME.fullmatch(name).groups()  # type: ignore[union-attr]  # it matches anything
+    row = ZOO.get(ALIASES.get(base, base))
+    if row is None:
+        raise UsageError(f"There is no architecture {name!r}; choose one of {', '.join((*ALIASES, *ZOO))}, "
+                         "with -w4 at the end for 4/16 of the channels.")  # fmt: skip
+    widths = tuple(int(part) / SIXTEENTHS for part in suffix.split("-w")[1:])
+    if len(widths) > row.widths or 0.0 in widths:
+        raise UsageError(f"The architecture {name!r} cannot be: {base} takes at most {row.widths} width(s), above 0.")
+    return row, (widths or (1.0,)) * (row.widths if len(widths) < 2 else 1)
+
+
+_NAME = re.compile(r"(.*?)((?:-w\d+)*)", re.DOTALL)

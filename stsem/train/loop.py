@@ -16,7 +16,7 @@ from stsem import chance
 from stsem.errors import TrainingError
 from stsem.inference.preprocess import difference_input, image_input
 from stsem.inference.sidecar import Sidecar
-from stsem.models.two_stream import OneStream, TwoStream
+from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
 from stsem.train.augment import Augmentation, View, view
 from stsem.train.dataset import PairFolder
@@ -75,7 +75,7 @@ class Training:
     """A network in training.
 
     Args:
-        architecture: a row of `stsem.models.zoo.ARCHITECTURES`.
+        architecture: a name that `stsem.models.zoo.build` knows.
         sidecar: how inputs are formed, and the classes.
         objective: the loss.
         how: random views.
@@ -89,6 +89,7 @@ class Training:
         self._architecture, self._sidecar, self._objective = architecture, sidecar, objective
         self._how, self._schedule = how, schedule
         self.network = build(architecture, len(sidecar.classes))
+        _check_inputs(architecture, self.network, sidecar)
         self.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self._mean = AveragedModel(self.network, multi_avg_fn=_running_mean(schedule.average), use_buffers=True)
         self._optimiser = torch.optim.AdamW(self.network.parameters(), schedule.rate, weight_decay=schedule.decay)
@@ -128,7 +129,8 @@ class Training:
         views = [view(pairs.pair(int(i)), self._how, rng) for i in chosen]
         network = self._replicas[worker].train()
         network.zero_grad(set_to_none=True)
-        loss = self._objective(network, *tensors(views, self._sidecar)) / len(self._replicas)
+        inputs, labels = tensors(views, self._sidecar)
+        loss = self._objective(network, [inputs[name] for name in network.inputs], labels) / len(self._replicas)
         loss.backward()  # type: ignore[no-untyped-call]
         return float(loss.detach())
 
@@ -177,7 +179,7 @@ def _running_mean(factor: float) -> Callable[[Tensors, Tensors, torch.Tensor | i
     return update
 
 
-def _replica(network: TwoStream | OneStream) -> TwoStream | OneStream:
+def _replica(network: SegmentationNetwork) -> SegmentationNetwork:
     """The same weights in the same memory, with gradients and batch statistics of its own."""
     twin = copy.deepcopy(network)
     for own, shared in zip(twin.parameters(), network.parameters(), strict=True):
@@ -185,16 +187,21 @@ def _replica(network: TwoStream | OneStream) -> TwoStream | OneStream:
     return twin
 
 
-def tensors(views: list[View], sidecar: Sidecar) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Inputs (B, 3, H, W) twice and labels (B, H, W) int64, formed by the functions that inference uses."""
-    scale = sidecar.difference
-    images = [image_input(v.current, sidecar) for v in views]
-    differences = (
-        [difference_input(v.current, v.previous if scale else None, scale) for v in views] if scale else images
-    )
-    image, difference = (torch.from_numpy(np.stack(x)).to(memory_format=torch.channels_last)
-                         for x in (images, differences))  # fmt: skip
-    return image, difference, torch.from_numpy(np.stack([v.labels for v in views]).astype(np.int64))
+def _check_inputs(architecture: str, network: SegmentationNetwork, sidecar: Sidecar) -> None:
+    known = {"image", "difference"} if sidecar.difference else {"image"}
+    for name in network.inputs:
+        if name not in known:
+            raise TrainingError(f"The architecture {architecture} takes {name!r}, which these pairs and sidecar do not "
+                                f"give ({', '.join(sorted(known))}); choose another one.")  # fmt: skip
+
+
+def tensors(views: list[View], sidecar: Sidecar) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
+    """Inputs by name (B, 3, H, W) and labels (B, H, W) int64, formed by the functions that inference uses."""
+    inputs = {"image": [image_input(v.current, sidecar) for v in views]}
+    if sidecar.difference:
+        inputs["difference"] = [difference_input(v.current, v.previous, sidecar.difference) for v in views]
+    stacked = {name: torch.from_numpy(np.stack(x)).to(memory_format=torch.channels_last) for name, x in inputs.items()}
+    return stacked, torch.from_numpy(np.stack([v.labels for v in views]).astype(np.int64))
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

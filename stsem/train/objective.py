@@ -1,5 +1,6 @@
-"""What a training minimises: cross-entropy of the fused answer, of each stream, and of the auxiliary heads."""
+"""What a training minimises: cross-entropy of the answer, and of whatever else the network lets the loss judge."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +10,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from stsem.classes import NO_LABEL
-from stsem.models.resnet import STRIDE
-from stsem.models.two_stream import COLOUR_WEIGHT, DIFFERENCE_WEIGHT, OneStream, TwoStream
+from stsem.models.network import SegmentationNetwork, softmax
 
-AUXILIARY = 0.4
-"""Weight of the auxiliary heads (Zhao et al., section 3.3)."""
-STREAM = 0.5
-"""Weight of each stream's own cross-entropy beside the fused one."""
 BALANCE = 0.3
 """Class weights are share ** -BALANCE, scaled so that the mean over pixels is 1: rare classes count somewhat more."""
 FINE = 2
@@ -40,30 +36,34 @@ class Objective:
     weights: Tensor
     bf16: bool = False
 
-    def __call__(self, network: TwoStream | OneStream, image: Tensor, difference: Tensor, labels: Tensor) -> Tensor:
-        """Scalar loss of inputs (B, 3, H, W) and labels (B, H, W) int64, NO_LABEL ignored."""
-        fine, coarse = labels[:, ::FINE, ::FINE], labels[:, ::STRIDE, ::STRIDE]
+    def __call__(self, network: SegmentationNetwork, inputs: Sequence[Tensor], labels: Tensor) -> Tensor:
+        """Scalar loss of inputs (B, channels, H, W) as the network orders them, and labels (B, H, W) int64."""
         with torch.autocast("cpu", torch.bfloat16, enabled=self.bf16):
-            colour, colour_aux = network.colour.forward_with_auxiliary(image)
-            moving, moving_aux = (network.difference.forward_with_auxiliary(difference)
-                                  if isinstance(network, TwoStream) else (None, None))  # fmt: skip
-        p = _enlarged(colour, fine)
-        loss = AUXILIARY * self._entropy(functional.log_softmax(colour_aux.float(), 1), coarse)
-        if moving is None or moving_aux is None:
-            return loss + self._nll(p, fine)
-        q = _enlarged(moving, fine)
-        loss = loss + AUXILIARY * self._entropy(functional.log_softmax(moving_aux.float(), 1), coarse)
-        streams = self._nll(p, fine) + self._nll(q, fine)
-        return loss + STREAM * streams + self._nll(COLOUR_WEIGHT * p + DIFFERENCE_WEIGHT * q, fine)
+            answers = network.answers(*inputs)
+        fine = labels[:, ::FINE, ::FINE]
+        loss = self._of_probabilities(answers.probabilities, fine)
+        for side in answers.sides:
+            if side.enlarged:
+                loss = loss + side.weight * self._of_probabilities(softmax(side.logits), fine)
+            else:
+                logarithms = functional.log_softmax(side.logits.float(), 1)
+                loss = loss + side.weight * self._entropy(logarithms, _at_grid(labels, side.logits))
+        return loss
 
-    def _nll(self, probabilities: Tensor, labels: Tensor) -> Tensor:
-        return self._entropy(probabilities.clamp_min(1e-6).log(), labels)
+    def _of_probabilities(self, probabilities: Tensor, labels: Tensor) -> Tensor:
+        return self._entropy(_enlarged(probabilities, labels).clamp_min(1e-6).log(), labels)
 
-    def _entropy(self, log_probabilities: Tensor, labels: Tensor) -> Tensor:
-        return functional.nll_loss(log_probabilities, labels, self.weights, ignore_index=NO_LABEL)
+    def _entropy(self, logarithms: Tensor, labels: Tensor) -> Tensor:
+        return functional.nll_loss(logarithms, labels, self.weights, ignore_index=NO_LABEL)
 
 
-def _enlarged(logits: Tensor, labels: Tensor) -> Tensor:
+def _enlarged(probabilities: Tensor, labels: Tensor) -> Tensor:
     """Probabilities (B, C, h', w') on the labels' grid, enlarged as in the exported graph."""
-    probabilities = functional.softmax(logits.float(), 1)
     return functional.interpolate(probabilities, size=labels.shape[-2:], mode="bilinear", align_corners=True)
+
+
+def _at_grid(labels: Tensor, logits: Tensor) -> Tensor:
+    """Labels (B, h, w) nearest to the points of a grid (B, C, h, w) whose corners are those of the image."""
+    rows, columns = (torch.linspace(0, side - 1, count).round().long()
+                     for side, count in zip(labels.shape[-2:], logits.shape[-2:], strict=True))  # fmt: skip
+    return labels[:, rows[:, None], columns]

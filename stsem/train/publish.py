@@ -9,13 +9,13 @@ from stsem.errors import NetworkError, OutputError
 from stsem.inference.network import CLASS_COUNT, Network, load_network
 from stsem.inference.preprocess import network_inputs
 from stsem.inference.sidecar import Sidecar, render
-from stsem.models.export import AGREEMENT, agreement, export_onnx
-from stsem.models.two_stream import OneStream, TwoStream
+from stsem.models.export import Agreement, agreement, export_onnx
+from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
 from stsem.train.loop import averaged_weights, read_checkpoint
 
 
-def load_checkpoint(path: Path, classes: int) -> TwoStream | OneStream:
+def load_checkpoint(path: Path, classes: int) -> SegmentationNetwork:
     """The network of a checkpoint with its averaged weights, in evaluation mode.
 
     Raises:
@@ -31,8 +31,10 @@ def load_checkpoint(path: Path, classes: int) -> TwoStream | OneStream:
     return network.eval()
 
 
-def publish(network: TwoStream | OneStream, sidecar: Sidecar, path: Path) -> Network:
+def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passes: int = 0) -> Network:
     """Write `path` (.onnx) and its sidecar (.toml) for inputs of `sidecar.size`, and check them.
+
+    With `passes` of Monte Carlo dropout the graph also gives the maps of uncertainty.
 
     Returns:
         The network as a user would load it.
@@ -41,24 +43,27 @@ def publish(network: TwoStream | OneStream, sidecar: Sidecar, path: Path) -> Net
         NetworkError: the size does not fit, or the exported graph disagrees with torch.
         OutputError: a file cannot be written.
     """
-    export_onnx(network, path, size=sidecar.size, metadata={CLASS_COUNT: str(len(sidecar.classes))})
+    export_onnx(network, path, size=sidecar.size, metadata={CLASS_COUNT: str(len(sidecar.classes))}, passes=passes)
     try:
         path.with_suffix(".toml").write_text(render(sidecar), encoding="utf-8")
     except OSError as err:
         raise OutputError(f"The sidecar of {path} cannot be written: {err.strerror}.") from err
     published = load_network(path)
-    share = _agreement_on_noise(network, published)
-    if share < AGREEMENT:
-        raise NetworkError(f"The exported network {path} gives only {share:.4%} of the labels that torch gives, "
-                           f"{AGREEMENT:.2%} are needed; do not use it.")  # fmt: skip
+    found = _agreement_on_noise(network, published, passes)
+    if not found.holds:
+        raise NetworkError(
+            f"The exported network {path} gives {found.labels:.4%} of the labels that torch gives, and its confidence "
+            f"is off by up to {found.largest:.1e}; {Agreement.SHARE:.2%} and {Agreement.DIFFERENCE:.0e} are needed. "
+            "Do not use it."
+        )
     return published
 
 
-def _agreement_on_noise(network: TwoStream | OneStream, published: Network) -> float:
+def _agreement_on_noise(network: SegmentationNetwork, published: Network, passes: int) -> Agreement:
     """On a smooth random image and a shifted copy, so that classes change across it."""
     width, height = published.size
     coarse = torch.from_numpy(chance.generator(0, "agreement").random((1, 3, 12, 20)))
     full = torch.nn.functional.interpolate(coarse, size=(height, width + 8), mode="bicubic")[0]
     image = (full.clamp(0, 1) * 255).byte().permute(1, 2, 0).numpy()
     inputs = network_inputs(image[:, 8:].copy(), image[:, :-8].copy(), published.sidecar)
-    return agreement(network, published.path, inputs)
+    return agreement(network, published.path, inputs, passes)

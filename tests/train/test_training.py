@@ -12,8 +12,6 @@ from stsem.errors import NetworkError, TrainingError
 from stsem.frame import Frame
 from stsem.inference.inferencer import Inferencer
 from stsem.inference.sidecar import Difference, Sidecar
-from stsem.models.resnet import ResNetSpec
-from stsem.models.zoo import ARCHITECTURES, Architecture
 from stsem.train.augment import Augmentation, view
 from stsem.train.dataset import Pair, PairFolder, class_shares, save_pair
 from stsem.train.loop import Progress, Schedule, Training
@@ -45,15 +43,10 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> PairFolder:
     return PairFolder(folder)
 
 
-@pytest.fixture(autouse=True)
-def _tiny(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(ARCHITECTURES, "tiny", Architecture(ResNetSpec(18, 1 / 8), ResNetSpec(18, 1 / 16)))
-
-
 def _training(iterations: int) -> Training:
     schedule = Schedule(iterations, batch=4, rate=5e-3, warm_up=4, average=0.9, checkpoint_every=4)
     objective = Objective(class_weights(np.array([0.6, 0.2, 0.2])))
-    return Training("tiny", SIDECAR, objective, Augmentation(SIZE, (1.0, 1.2)), schedule)
+    return Training("pspnet-r18-w2-w1", SIDECAR, objective, Augmentation(SIZE, (1.0, 1.2)), schedule)
 
 
 def test_it_learns_and_what_it_publishes_works(pairs: PairFolder, tmp_path: Path) -> None:

@@ -1,0 +1,44 @@
+"""What a network costs: counted, not typed."""
+
+from dataclasses import dataclass
+
+import torch
+from torch.utils.flop_counter import FlopCounterMode
+
+from stsem.models.network import CHANNELS, SegmentationNetwork
+from stsem.models.zoo import build
+
+SIDE = 473
+"""Pixels a side, the paper's figure for PSPNet on ResNet-50; 48 k - 7."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Size and work of a network.
+
+    Args:
+        parameters: weights that an answer needs.
+        auxiliary: further weights, of heads that serve the loss alone.
+        multiply_adds: of convolutions and matrix products for one answer.
+    """
+
+    parameters: int
+    auxiliary: int
+    multiply_adds: int
+
+
+def cost_of(network: SegmentationNetwork, side: int = SIDE) -> Cost:
+    """The cost of a network for inputs of `side` x `side`; on the meta device nothing is computed."""
+    device = next(network.parameters()).device
+    inputs = [torch.zeros(1, CHANNELS[name], side, side, device=device) for name in network.inputs]
+    with torch.no_grad(), FlopCounterMode(display=False) as counter:
+        network.eval()(*inputs)
+    sizes = {name: parameter.numel() for name, parameter in network.named_parameters()}
+    auxiliary = sum(size for name, size in sizes.items() if "auxiliary" in name.split("."))
+    return Cost(sum(sizes.values()) - auxiliary, auxiliary, counter.get_total_flops() // 2)
+
+
+def cost(name: str, classes: int, side: int = SIDE) -> Cost:
+    """The cost of a network of the zoo by name. Raises UsageError as `build` does."""
+    with torch.device("meta"):
+        return cost_of(build(name, classes), side)
