@@ -8,15 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from stsem.errors import ChannelError, DecodeError, LogError, UndecodableError, UsageError
-from stsem.log.calibration import Optics, color_optics, own_optics
-from stsem.log.choose import (
-    Candidate,
-    check_overrides,
-    choose_color,
-    choose_partner,
-    nearest_track,
-)
+from stsem.errors import DecodeError, LogError, UndecodableError, UsageError
+from stsem.log.calibration import Optics, color_optics, own_optics, same_shape
+from stsem.log.candidate import Candidate
+from stsem.log.choose import check_overrides, nearest_track
 from stsem.log.classtable import ClassTable, find_table, read_file
 from stsem.log.container.files import File
 from stsem.log.container.store import Store
@@ -27,6 +22,7 @@ from stsem.log.poses.tree import static_transform
 from stsem.log.reading import ImageChannel
 from stsem.log.registration import REGISTERED, DepthReader, View, claims_colour_pixels, depth_reader
 from stsem.log.remark import Remark
+from stsem.log.roles import Roles, choose_roles
 from stsem.log.scan import Scan
 from stsem.log.schemas.messages import Kind
 from stsem.log.sizes import usual_size
@@ -47,6 +43,7 @@ class Assembly:
         table: class table of the labels.
         clock_offsets_ns: topic -> what is taken out of its log times; only those that differ from 0.
         images: every image channel, and what it holds.
+        why_color: why colour is that channel, in a few words.
         asked: roles whose channel was asked for by name.
         warnings: one sentence each.
     """
@@ -61,6 +58,7 @@ class Assembly:
     table: ClassTable | None = None
     clock_offsets_ns: dict[str, int] = field(default_factory=dict)
     images: Sequence[Candidate] = ()
+    why_color: str = ""
     asked: frozenset[str] = frozenset()
     warnings: list[str] = field(default_factory=list)
 
@@ -88,22 +86,20 @@ def assemble(
     asked = check_overrides(topics, tracks)
     channels = {id(t): ImageChannel(t, store, scan.damage) for t in tracks if t.is_image and t.count}
     images = [Candidate(channel.track, channel.look()) for channel in channels.values()]
-    free = [image for image in images if not any(image.track is track for track in asked.values())]
-    color = _asked(images, asked, "color") or choose_color(free, tracks)
-    result = Assembly(channels[id(color.track)], (0, 0), images=images, asked=frozenset(asked))
+    roles = choose_roles(images, asked, tracks)
+    color = roles.color
+    result = Assembly(
+        channels[id(color.track)], (0, 0), images=images, why_color=roles.why_color, asked=frozenset(asked),
+        depth=channels[id(roles.depth.track)] if roles.depth else None,
+        labels=channels[id(roles.labels.track)] if roles.labels else None,
+        warnings=list(roles.warnings),
+    )  # fmt: skip
     _refuse_unrelated(scan.files, result.color)
     refuse_restarted(result.color)
     result.size = _size(result.color)
-    free = [image for image in free if image is not color]
-    depth = _asked(images, asked, "depth") or _partner(free, "depth", color, result.warnings)
-    free = [image for image in free if image is not depth]
-    labels = _asked(images, asked, "labels") or _partner(free, "labels", color, result.warnings)
-    if depth is not None:
-        result.depth = channels[id(depth.track)]
-    if labels is not None:
-        result.labels = channels[id(labels.track)]
+    _check_shape(result, roles.labels)
     _find_classes(result, scan, classes_file)
-    _find_optics(result, images, color, depth, tracks, depth_registered)
+    _find_optics(result, roles, tracks, depth_registered)
     result.poses, warnings = find_poses(tracks, asked.get("pose"), color.look.frame_id, result.color.rows.stamp_ns)
     result.warnings += warnings
     _check_clocks(result, tracks)
@@ -131,23 +127,6 @@ def _refuse_unrelated(files: Sequence[File], color: ImageChannel) -> None:
             )
 
 
-def _asked(images: Sequence[Candidate], asked: Mapping[str, Track], role: str) -> Candidate | None:
-    track = asked.get(role)
-    if track is None:
-        return None
-    found = next((c for c in images if c.track is track), None)
-    if found is None:
-        raise ChannelError(f"{track.topic} was given for {role}, but it has no message; choose another topic.")
-    return found
-
-
-def _partner(images: Sequence[Candidate], role: str, color: Candidate, warnings: list[str]) -> Candidate | None:
-    found, warning = choose_partner(images, role, color)
-    if warning:
-        warnings.append(warning)
-    return found
-
-
 def _size(color: ImageChannel) -> tuple[int, int]:
     """Size of the colour images.
 
@@ -166,14 +145,14 @@ def _size(color: ImageChannel) -> tuple[int, int]:
     )
 
 
-def _find_optics(
-    result: Assembly, images: Sequence[Candidate], color: Candidate, depth: Candidate | None, tracks: Sequence[Track],
-    registered: str,
-) -> None:  # fmt: skip
+def _find_optics(result: Assembly, roles: Roles, tracks: Sequence[Track], registered: str) -> None:
     """The colour camera's intrinsics, and how depth comes onto its pixels."""
+    color, depth, extrinsic = roles.color, roles.depth, partial(static_transform, tracks)
     size = usual_size(result.depth, decode.depth) if result.depth else None
-    claimed = depth and size and claims_colour_pixels(depth, size, color, result.size, registered)
-    result.optics = color_optics(tracks, images, color, result.size, depth if claimed else None)
+    claimed = depth and size and claims_colour_pixels(
+        depth, size, color, result.size, registered, extrinsic, roles.depth_owner
+    )  # fmt: skip
+    result.optics = color_optics(tracks, result.images, color, result.size, depth if claimed else None)
     result.warnings += result.optics.warnings
     if depth is None:
         return
@@ -182,10 +161,22 @@ def _find_optics(
         result.warnings.append(Remark("depth-undecodable", sentence))
     else:
         views = View(depth, size, own_optics(tracks, depth, size)), View(color, result.size, result.optics)
-        result.depth_reader, warnings = depth_reader(*views, registered, partial(static_transform, tracks))
+        result.depth_reader, warnings = depth_reader(*views, registered, extrinsic, roles.depth_owner)
         result.warnings += warnings
     if result.depth_reader is None:
         result.depth = None
+
+
+def _check_shape(result: Assembly, labels: Candidate | None) -> None:
+    """Labels of another shape than colour show another part of the scene, or a distorted one."""
+    size = labels.look.size if labels else None
+    if labels is None or size is None or min(size) <= 0 or same_shape(size, result.size):
+        return
+    sentence = (
+        f"{labels.topic} is {size[0]}x{size[1]} and {result.color.topic} {result.size[0]}x{result.size[1]}, which is "
+        "another shape: answers are stretched to the labels to be scored, which is wrong if the labels were cropped."
+    )
+    result.warnings.append(Remark("truth-shape", sentence))
 
 
 def _find_classes(result: Assembly, scan: Scan, classes_file: Path | None) -> None:

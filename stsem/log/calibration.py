@@ -7,7 +7,8 @@ from stsem.camera import Camera
 from stsem.classes import Labels
 from stsem.frame import Depth, Image
 from stsem.geometry.undistort import Undistortion
-from stsem.log.choose import Candidate, choose_calibration
+from stsem.log.candidate import Candidate
+from stsem.log.choose import choose_calibration
 from stsem.log.prefetch import Recent
 from stsem.log.remark import Remark
 from stsem.log.schemas.messages import Calibration

@@ -2,21 +2,18 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from stsem.errors import ChannelError, UsageError
 from stsem.log import topicnames
-from stsem.log.pixels.look import Look
+from stsem.log.cameras import other_owner
+from stsem.log.candidate import Candidate
 from stsem.log.remark import Remark
 from stsem.log.schemas.messages import Kind
 from stsem.log.topicnames import (
     ALIGNED_WORDS,
-    COLOUR_WORDS,
     INFRARED_WORDS,
     INSTANCE_WORDS,
-    NO_DEPTH_WORDS,
     NO_POSE_WORDS,
-    OVERLAY_WORDS,
     PAINTED_WORDS,
     SIDE_WORDS,
     TRUTH_WORDS,
@@ -24,55 +21,9 @@ from stsem.log.topicnames import (
 from stsem.log.tracks import Track
 
 ROLES = ("color", "depth", "pose", "labels")
-DULL_WORDS = INFRARED_WORDS | PAINTED_WORDS | OVERLAY_WORDS | NO_DEPTH_WORDS
 OTHERS_WORDS = INFRARED_WORDS | SIDE_WORDS | frozenset({"depth", "disparity"})
 """In the name of a calibration, and not in that of the image: it is that of another camera."""
 RIVALS_NAMED = 5
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An image channel and what it could be used as."""
-
-    track: Track
-    look: Look
-
-    @property
-    def topic(self) -> str:
-        """Its topic."""
-        return self.track.topic
-
-    @property
-    def words(self) -> frozenset[str]:
-        """Words of the topic, in lower case."""
-        return frozenset(topicnames.words(self.topic))
-
-    @property
-    def nature(self) -> str:
-        """What it looks like: "color", "depth", "labels", "video"; or nothing, as ids of things and overlays are."""
-        told, order = topicnames.told(self.topic), self.look.order
-        floats = order == "metric" and self.look.bits != 16
-        if order == "labels" or (told == "labels" and order not in ("video", "spoilt") and not floats):
-            of_things = self.words & INSTANCE_WORDS and "semantic" not in self.words
-            return "" if of_things or self.words & OVERLAY_WORDS else "labels"
-        if order == "metric":
-            return "" if self.words & (INFRARED_WORDS | NO_DEPTH_WORDS) else "depth"
-        if order in ("rgb", "bgr", "grey"):
-            return "" if told == "depth" else "color"
-        if order == "unknown":
-            return told or "color"
-        return order
-
-    @property
-    def base(self) -> tuple[str, ...]:
-        """The camera it belongs to: the topic without transport and without image_*."""
-        return topicnames.camera(self.topic)
-
-    @property
-    def claim(self) -> tuple[bool, bool, bool]:
-        """How much it claims to be THE colour camera."""
-        known_colour = self.look.order in ("rgb", "bgr")
-        return not self.words & DULL_WORDS, known_colour, bool(self.words & COLOUR_WORDS)
 
 
 def check_overrides(topics: Mapping[str, str], tracks: Sequence[Track]) -> dict[str, Track]:
@@ -112,73 +63,57 @@ def _can_be(role: str, track: Track) -> bool:
     return track.kind in (Kind.POSE, Kind.TRANSFORMS) if role == "pose" else track.is_image
 
 
-def choose_color(images: Sequence[Candidate], everything: Sequence[Track]) -> Candidate:
-    """The colour camera's channel: most messages within the camera, then the compressed one.
-
-    Raises:
-        ChannelError: there is none, or two cameras have an equal claim.
-    """
-    cameras: dict[tuple[str, ...], list[Candidate]] = defaultdict(list)
-    for candidate in images:
-        if candidate.nature == "color":
-            cameras[candidate.base].append(candidate)
-    if not cameras:
-        videos = [c for c in images if c.nature == "video"]
-        if videos:
-            raise ChannelError(
-                f"The only camera {videos[0].topic} holds {videos[0].look.name} video, which stsem does not decode; "
-                "record or convert it as jpeg, png or raw images.",
-                "color",
-            )
-        there = (
-            ", ".join(f"{t.topic} ({t.schema or t.encoding}, {t.count} messages)" for t in everything)
-            or "no channel at all"
-        )
-        raise ChannelError(
-            f"The log has no colour images; it has {there}; give --topic color=TOPIC if one of them is.", "color"
-        )
-    best = [max(group, key=_within_camera) for group in cameras.values()]
-    claim = max(candidate.claim for candidate in best)
-    rivals = sorted((c for c in best if c.claim == claim), key=lambda c: c.topic)
-    if len(rivals) > 1:
-        names = ", ".join(f"{c.topic} ({c.track.count} messages)" for c in rivals)
-        raise ChannelError(
-            f"{len(rivals)} cameras could be the colour camera: {names}; choose one with --topic color=TOPIC.",
-            "color",
-            tuple(c.topic for c in rivals),
-        )
-    return rivals[0]
-
-
-def _within_camera(candidate: Candidate) -> tuple[int, bool, str]:
-    return candidate.track.count, candidate.track.kind is Kind.COMPRESSED, candidate.topic
-
-
-def choose_partner(images: Iterable[Candidate], nature: str, color: Candidate) -> tuple[Candidate | None, str]:
+def choose_partner(images: Sequence[Candidate], nature: str, color: Candidate) -> tuple[Candidate | None, str]:
     """(the channel of `nature` "depth" or "labels" nearest to the colour camera, a warning or "").
 
-    Nearest depth: in the colour camera's frame, aligned by name, the longest common beginning of the topic, most
-    messages. Labels of classes before those with things, ids before painted ones. At last by name, with a warning.
+    Nearest depth: not another camera's, in the colour camera's frame, aligned by name, the longest common beginning of
+    the topic, most messages. Labels of classes before those with things, ids before painted ones; another camera's are
+    none. At last by name, with a warning. Of one topic's transports with as many messages the one that costs least.
     """
     found = sorted((c for c in images if c.nature == nature and c.track.count), key=lambda c: c.topic)
     if not found:
         return None, _no_depth(images) if nature == "depth" else ""
+    owners = {c.topic: other_owner(c, color, images) for c in found}
 
     def nearness(c: Candidate) -> tuple[int, ...]:
-        same_frame = bool(c.look.frame_id) and c.look.frame_id == color.look.frame_id
+        same_frame = c.in_frame_of(color)
         place = topicnames.common(c.base, color.base), c.track.count
         if nature == "labels":
             of_classes = not c.words & (INSTANCE_WORDS | {"panoptic"})
             ids = not c.words & PAINTED_WORDS, c.look.order in ("grey", "metric")
             return (of_classes, *ids, same_frame, *place)
-        return (same_frame, bool(c.words & ALIGNED_WORDS), *place)
+        return (not owners[c.topic], same_frame, bool(c.words & ALIGNED_WORDS), *place)
 
-    return _best(found, nearness, nature)
+    if nature == "labels" and all(owners.values()):
+        return None, _others_labels(found[0], owners[found[0].topic], color)
+    mine = [c for c in found if nature == "depth" or not owners[c.topic]]
+    return _best(_channels(mine, nearness), nearness, nature)
+
+
+def _others_labels(labels: Candidate, owner: Candidate | None, color: Candidate) -> str:
+    whose = owner.topic if owner else "another camera"
+    sentence = (
+        f"{labels.topic} (frame {labels.look.frame_id!r}) belongs to {whose} and not to {color.topic} (frame "
+        f"{color.look.frame_id!r}): these labels are not used (--topic labels={labels.topic} uses them all the same)."
+    )
+    return Remark("truth-other-camera", sentence)
+
+
+def _channels(found: Iterable[Candidate], key: Callable[[Candidate], tuple[int, ...]]) -> list[Candidate]:
+    """One of each channel: the nearest of its transports, of equal ones raw before compressedDepth before a file."""
+    channels: dict[tuple[str, ...], list[Candidate]] = defaultdict(list)
+    for c in found:
+        channels[topicnames.without_transport(c.topic)].append(c)
+
+    def cheapness(c: Candidate) -> tuple[bool, bool]:
+        return c.track.kind is Kind.IMAGE, c.topic.lower().endswith("/compresseddepth")
+
+    return [max(group, key=lambda c: (key(c), cheapness(c))) for group in channels.values()]
 
 
 def _no_depth(images: Iterable[Candidate]) -> str:
     """A remark when a topic says depth and its pixels cannot be: jpeg, 8 bits, colours; "" otherwise."""
-    spoilt = (c for c in images if topicnames.told(c.topic) == "depth" and not c.words & DULL_WORDS)
+    spoilt = (c for c in images if topicnames.told(c.topic) == "depth" and not c.is_dull)
     for c in sorted(spoilt, key=lambda c: c.topic):
         if c.look.order in ("rgb", "bgr", "grey", "spoilt"):
             needed = "depth needs 16 bits or floats of one channel, and is not used"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from stsem.log.assemble import Assembly
-from stsem.log.choose import Candidate
+from stsem.log.candidate import Candidate
 from stsem.log.container.files import Given, natural
 from stsem.log.container.source import is_url, local_path, shown_name
 from stsem.log.info import ChannelInfo, Choice, LogInfo
@@ -96,12 +96,9 @@ def _roles(assembly: Assembly, tracks: Sequence[Track]) -> dict[int, str]:
 def _reasons(assembly: Assembly, scan: Scan) -> dict[str, str]:
     """Role -> why this channel: the rules of `choose` in a few words."""
     rivals = Counter(image.nature for image in assembly.images)
-    camera = next((image.base for image in assembly.images if image.track is assembly.color.track), ())
-    same = sum(image.nature == "color" and image.base == camera for image in assembly.images)
-    of_color = "only one" if rivals["color"] == 1 else "most messages" if same == rivals["color"] else "by its name"
     poses = sum(track.kind is Kind.POSE and track.count > 0 for track in scan.tracks.values())
     reasons = {
-        "color": of_color,
+        "color": assembly.why_color,
         "depth": "only one" if rivals["depth"] == 1 else "nearest to color",
         "labels": "only one" if rivals["labels"] == 1 else "nearest to color",
         "pose": "only one" if poses == 1 else "by its name",

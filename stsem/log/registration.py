@@ -10,7 +10,7 @@ from stsem.camera import Camera
 from stsem.frame import Depth
 from stsem.geometry.register_depth import DepthRegistration
 from stsem.log.calibration import Optics, Size, same_shape
-from stsem.log.choose import Candidate
+from stsem.log.candidate import Candidate
 from stsem.log.pixels import decode
 from stsem.log.pixels.look import ImageMessage
 from stsem.log.remark import Remark
@@ -25,6 +25,8 @@ SAME_CAMERA_IF_CLAIMED = 0.02
 """... and when frame and size say so: two calibrations of one camera."""
 
 Step = Callable[[Depth], Depth]
+Extrinsic = Callable[[str, str], Pose | None]
+"""(target frame, source frame) -> T_target_source of the log, None when it is not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,25 +76,38 @@ class DepthReader:
         return depth
 
 
-def claims_colour_pixels(depth: Candidate, size: Size, color: Candidate, color_size: Size, registered: str) -> bool:
-    """Whether depth's pixels are said to be those of colour: by the user, by its topic, or by frame and size."""
+def claims_colour_pixels(
+    depth: Candidate, size: Size, color: Candidate, color_size: Size, registered: str, extrinsic: Extrinsic,
+    owner: Candidate | None = None,
+) -> bool:  # fmt: skip
+    """Whether depth's pixels are said to be those of colour: by the user, by frame and size, or by its topic.
+
+    Drivers that align depth give it colour's frame. A word in the topic counts in another frame only where the log does
+    not say that the two cameras are apart, and the depth is not that of another camera.
+    """
     if registered != "auto":
         return registered == "yes"
-    same_frame = depth.look.frame_id == color.look.frame_id
-    return bool(depth.words & ALIGNED_WORDS) or (same_frame and size == color_size)
+    aligned = bool(depth.words & ALIGNED_WORDS)
+    if depth.look.frame_id == color.look.frame_id:
+        return aligned or size == color_size
+    if not aligned or owner is not None:
+        return False
+    T = extrinsic(color.look.frame_id, depth.look.frame_id)
+    return T is None or _is_identity(T)
 
 
 def depth_reader(
-    depth: View, color: View, registered: str, extrinsic: Callable[[str, str], Pose | None]
+    depth: View, color: View, registered: str, extrinsic: Extrinsic, owner: Candidate | None = None
 ) -> tuple[DepthReader | None, list[str]]:
     """(how depth is brought onto the pixels of colour, or None where that cannot be known, warnings).
 
     Args:
         depth, color: the channels; the optics of depth are its own or nobody's.
         registered: "yes": depth's pixels are colour's; "no": they never are without an extrinsic; "auto".
-        extrinsic: (target frame, source frame) -> T_target_source of the log, None when it is not known.
+        extrinsic: of the log.
+        owner: the other camera that depth belongs to; its pixels are never taken as colour's by "auto".
     """
-    claimed = claims_colour_pixels(depth.image, depth.size, color.image, color.size, registered)
+    claimed = claims_colour_pixels(depth.image, depth.size, color.image, color.size, registered, extrinsic, owner)
     if claimed and same_shape(depth.size, color.size) and not (registered == "auto" and _contradicted(depth, color)):
         return DepthReader(depth.size, _as_colour(depth, color, registered)), []
     if registered == "yes":
@@ -103,14 +118,15 @@ def depth_reader(
     T, missing = _extrinsic(depth, color, extrinsic)
     if T is not None and depth.optics.camera and color.optics.camera:
         return _through(depth, color, T)
-    if registered == "auto" and depth.size == color.size:
+    if registered == "auto" and depth.size == color.size and owner is None:
         sentence = (
             f"{depth.image.topic} is in frame {depth.frame_id!r} and colour in {color.frame_id!r}: "
             "taken as registered, being of the same size (--depth-registered yes|no)."
         )
         return DepthReader(depth.size, _as_colour(depth, color, registered)), [Remark("depth-assumed", sentence)]
+    where = f"belongs to {owner.topic}, not to {color}" if owner else f"is not on the pixels of {color}"
     sentence = (
-        f"{depth} is not on the pixels of {color}, and to register it the log lacks {missing}: depth is not used "
+        f"{depth} {where}, and to register it the log lacks {missing}: depth is not used "
         "(record that, or say --depth-registered yes if its pixels are those of colour)."
     )
     return None, [Remark("depth-unregistered", sentence)]
@@ -140,7 +156,7 @@ def _resize_to(size: Size) -> Step:
     return resize
 
 
-def _extrinsic(depth: View, color: View, extrinsic: Callable[[str, str], Pose | None]) -> tuple[Pose | None, str]:
+def _extrinsic(depth: View, color: View, extrinsic: Extrinsic) -> tuple[Pose | None, str]:
     """(T_color_depth, what is missing to register depth)."""
     missing = [f"a usable calibration of {view.image.topic}" for view in (depth, color) if view.optics.camera is None]
     known = bool(depth.frame_id and color.frame_id)
@@ -157,12 +173,16 @@ def _through(depth: View, color: View, T_color_depth: Pose) -> tuple[DepthReader
     if source is None or target is None:
         raise ValueError("registration needs two cameras")
     steps: tuple[Step, ...] = () if depth.optics.straight else (depth.optics.rectifier.depth,)
-    if np.allclose(T_color_depth, np.eye(4), rtol=0, atol=SAME_POSE) and _same_pixels(source, target, SAME_CAMERA):
+    if _is_identity(T_color_depth) and _same_pixels(source, target, SAME_CAMERA):
         return DepthReader(depth.size, steps), []
     metres = float(np.linalg.norm(T_color_depth[:3, 3]))
     sentence = f"{depth} is registered to {color} by calibrations and transforms ({metres:.3f} m apart)."
     steps = (*steps, DepthRegistration(source, target, T_color_depth))
     return DepthReader(depth.size, steps), [*depth.optics.warnings, Remark("depth-registered", sentence)]
+
+
+def _is_identity(T: Pose) -> bool:
+    return bool(np.allclose(T, np.eye(4), rtol=0, atol=SAME_POSE))
 
 
 def _same_pixels(a: Camera, b: Camera, share: float) -> bool:

@@ -16,8 +16,8 @@ LABEL_WORDS = (
 """Beginnings of words for images of class ids."""
 INSTANCE_WORDS = frozenset({"instance", "instances"})
 """Ids of things instead of classes: CARLA bridge, Isaac Sim."""
-OVERLAY_WORDS = frozenset({"overlay", "blend", "blended"})
-"""Labels painted over the image: network nodes."""
+OVERLAY_WORDS = frozenset({"overlay", "blend", "blended", "annotated"})
+"""Labels or boxes painted over the image: network nodes."""
 PAINTED_WORDS = frozenset({"debug", "visualization", "viz", "colored", "colorized", "colormap"})
 """Pictures for people: network nodes, RealSense colorizer, Isaac Sim."""
 DEPTH_WORDS = ("depth", "disparity")
@@ -53,10 +53,7 @@ def _words(topic: str) -> list[str]:
 
 def told(topic: str) -> str:
     """ "labels" or "depth", by the last word of the topic that tells, transports left aside; "" when none does."""
-    names = list(parts(topic))
-    while len(names) > 1 and names[-1].lower() in TRANSPORTS:
-        names.pop()
-    for word in reversed(_words("/".join(names))):
+    for word in reversed(_words("/".join(without_transport(topic)))):
         for nature, beginnings in (("labels", LABEL_WORDS), ("depth", DEPTH_WORDS)):
             if word.startswith(beginnings):
                 return nature
@@ -68,14 +65,18 @@ def parts(topic: str) -> tuple[str, ...]:
     return tuple(part for part in topic.split("/") if part)
 
 
+def without_transport(topic: str) -> tuple[str, ...]:
+    """The parts of a topic but those that image_transport added: equal for all transports of one channel."""
+    names = parts(topic)
+    while len(names) > 1 and names[-1].lower() in TRANSPORTS:
+        names = names[:-1]
+    return names
+
+
 def camera(topic: str) -> tuple[str, ...]:
     """The camera that an image topic belongs to: the topic without transport and without image_*."""
-    names = list(parts(topic))
-    while len(names) > 1 and names[-1].lower() in TRANSPORTS:
-        names.pop()
-    if len(names) > 1 and names[-1].lower().startswith("image"):
-        names.pop()
-    return tuple(names)
+    names = without_transport(topic)
+    return names[:-1] if len(names) > 1 and names[-1].lower().startswith("image") else names
 
 
 def common(a: Sequence[str], b: Sequence[str]) -> int:

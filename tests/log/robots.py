@@ -80,6 +80,7 @@ class Robot:
     info: Callable[[int], bytes | None] = info
     info_topic: str = "/cam/color/camera_info"
     labels: Callable[[int], Array | None] = label_picture
+    labels_frame: str = "camera"
     labels_stamp: Callable[[int], int] = lambda stamp: stamp
     tables: Sequence[dict[int, str]] = (NAMES,)
     poses: Put = field(default_factory=drive)
@@ -109,7 +110,7 @@ class Robot:
             )
             log.ros("/cam/depth/image_raw", IMAGE, encoded, stamp + 9 * MS)
         if (labels := self.labels(i)) is not None:
-            encoded = ROS.image(self.labels_stamp(stamp), labels, "mono8")
+            encoded = ROS.image(self.labels_stamp(stamp), labels, "mono8", frame_id=self.labels_frame)
             log.ros("/gt/labels", IMAGE, encoded, stamp + 20 * MS)
 
 

@@ -1,44 +1,21 @@
 """The choice of channels: what would be used of a log, told by topics, schemas and the first message."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import cv2
-import numpy as np
 import pytest
-from made_up_logs import BASE_NS, LEVEL, PERIOD_NS, ROS, Recorder, label_picture, picture
+from channel_kinds import IMAGE, record
+from made_up_logs import BASE_NS, PERIOD_NS, ROS, Recorder, picture
 from mcap.records import Schema
 
 from stsem.errors import ChannelError, UsageError
-from stsem.log.choose import Candidate, choose_calibration
+from stsem.log.candidate import Candidate
+from stsem.log.choose import choose_calibration
 from stsem.log.container.damage import Damage
 from stsem.log.info import Choice
 from stsem.log.log import open_log
 from stsem.log.pixels.look import Look
 from stsem.log.schemas.messages import Calibration
 from stsem.log.tracks import Track
-
-IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
-K = [30.0, 0, 15.5, 0, 30.0, 11.5, 0, 0, 1]
-DEPTH = np.full((24, 32), 1000, "<u2")
-Message = tuple[str, Callable[[int, int, str], bytes]]
-
-
-def odometry(stamp_ns: int, parent: str, child: str, position: tuple[float, float, float]) -> bytes:
-    x, y, z = (float(v) for v in position)
-    still = ROS("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0)
-    level = ROS("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
-    pose = ROS("geometry_msgs/msg/Pose", position=ROS("geometry_msgs/msg/Point", x=x, y=y, z=z), orientation=level)
-    twist = ROS("geometry_msgs/msg/Twist", linear=still, angular=still)
-    unknown = np.zeros(36)
-    return ROS.encode(
-        ROS(
-            "nav_msgs/msg/Odometry", header=ROS.header(stamp_ns, parent), child_frame_id=child,
-            pose=ROS("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=unknown),
-            twist=ROS("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=unknown),
-        )
-    )  # fmt: skip
 
 
 def calibration(topic: str, frame_id: str) -> Track:
@@ -47,46 +24,6 @@ def calibration(topic: str, frame_id: str) -> Track:
     made = Track(topic, Schema(id=1, name=name, encoding="ros2msg", data=ROS.schema(name)), "cdr", Damage())
     made.calibrations.append(Calibration(None, frame_id, None))
     return made
-
-
-def jpeg(i: int) -> bytes:
-    return bytes(cv2.imencode(".jpg", picture(i))[1])
-
-
-def raw(encoding: str, pixels: Callable[[int], Any]) -> Message:
-    return IMAGE, lambda stamp, i, frame: ROS.image(stamp, pixels(i), encoding, frame_id=frame)
-
-
-MESSAGES: dict[str, Message] = {
-    "rgb": raw("rgb8", picture),
-    "mono": raw("mono8", label_picture),
-    "labels": raw("mono8", label_picture),
-    "odd": raw("tetrachrome", picture),
-    "depth": raw("16UC1", lambda _: DEPTH),
-    "jpeg": (COMPRESSED, lambda stamp, i, frame: ROS.compressed(stamp, jpeg(i), "jpeg", frame)),
-    "h264": (COMPRESSED, lambda stamp, _, frame: ROS.compressed(stamp, b"\0\0\0\1g", "h264", frame)),
-    "info": ("sensor_msgs/msg/CameraInfo", lambda stamp, _, frame: ROS.camera_info(stamp, 32, 24, K, frame)),
-    "pose": ("geometry_msgs/msg/PoseStamped", lambda stamp, _, __: ROS.pose(stamp, (0, 0, 0))),
-    "odometry": ("nav_msgs/msg/Odometry", lambda stamp, i, frame: odometry(stamp, "odom", frame, (float(i), 0, 0))),
-    "tf": (
-        "tf2_msgs/msg/TFMessage",
-        lambda stamp, i, frame: ROS.tf(stamp, [("world", frame, (float(i), 0.0, 0.0), LEVEL)]),
-    ),
-    "names": ("vision_msgs/msg/LabelInfo", lambda stamp, _, __: ROS.label_info(stamp, {0: "a", 1: "b", 2: "c"})),
-}
-"""kind -> (schema, payload of (stamp, number of the frame, frame_id))."""
-
-
-def record(path: Path, topics: dict[str, str], frames: int = 3) -> Path:
-    """A log with the given topics, each of one of a few kinds of messages: KIND, or KIND@FRAME_ID."""
-    log = Recorder(path)
-    for i in range(frames):
-        stamp = BASE_NS + i * PERIOD_NS
-        for topic, asked in topics.items():
-            kind, _, frame = asked.partition("@")
-            schema, payload = MESSAGES[kind]
-            log.ros(topic, schema, payload(stamp, i, frame or "camera"), stamp)
-    return log.close()
 
 
 REALSENSE = {
@@ -186,6 +123,51 @@ CHOICES = {
     "truth before odometry": (
         {"/cam": "rgb", "/odom": "odometry", "/ground_truth/pose": "pose"},
         ("/cam", None, "/ground_truth/pose", None, None),
+    ),
+    "colour before grey of one camera": (
+        {"/k/qhd/image_color_rect": "rgb", "/k/qhd/image_mono_rect": "mono"},
+        ("/k/qhd/image_color_rect", None, None, None, None),
+    ),
+    "colour before the mosaic it is made of": (
+        {"/cam/image_raw": "bayer", "/cam/image_color": "rgb"}, ("/cam/image_color", None, None, None, None),
+    ),
+    "the mosaic before the grey that is made of it": (
+        {"/cam/image_raw": "bayer", "/cam/image_rect": "mono"}, ("/cam/image_raw", None, None, None, None),
+    ),
+    "rectified before not": (
+        {"/cam/image_rect": "rgb", "/cam/image_raw/compressed": "jpeg"}, ("/cam/image_rect", None, None, None, None),
+    ),
+    "an annotated picture is not the camera": (
+        {"/cam/image_annotated": "jpeg", "/cam/image": "rgb"}, ("/cam/image", None, None, None, None),
+    ),
+    "an eye that is sent as rgb, too": (
+        {
+            "/zed/rgb/image_rect_color": "rgb@left", "/zed/left/image_rect_color": "rgb@left",
+            "/zed/right/image_rect_color": "rgb@right", "/zed/rgb_raw/image_raw_color": "rgb@left",
+        },
+        ("/zed/rgb/image_rect_color", None, None, None, None),
+    ),
+    "transports of depth": (
+        {
+            "/cam": "rgb", "/d/image/compressed": "depth.png", "/d/image/compressedDepth": "depth.packed",
+            "/d/image": "depth",
+        },
+        ("/cam", "/d/image", None, None, None),
+    ),
+    "transports of depth without raw": (
+        {"/cam": "rgb", "/d/image/compressed": "depth.png", "/d/image/compressedDepth": "depth.packed"},
+        ("/cam", "/d/image/compressedDepth", None, None, None),
+    ),
+    "labels of the own camera": (
+        {
+            "/front/rgb": "rgb@front", "/rear": "mono@rear", "/rear/semantic": "labels@rear",
+            "/x_semantic": "labels@front", "/names": "names",
+        },
+        ("/front/rgb", None, None, "/x_semantic", None),
+    ),
+    "labels of an unknown frame": (
+        {"/front/rgb": "rgb@front", "/rear/rgb": "mono@rear", "/gt/labels": "labels@odd", "/names": "names"},
+        ("/front/rgb", None, None, "/gt/labels", None),
     ),
     "a goal is no pose": ({"/cam": "rgb", "/move/goal_pose": "pose"}, ("/cam", None, None, None, None)),
 }  # fmt: skip

@@ -62,6 +62,15 @@ def video(log: Recorder) -> None:
     log.ros("/rear", "sensor_msgs/msg/CompressedImage", ROS.compressed(BASE_NS, b"\0\0\0\1\x67", "h264"), BASE_NS)
 
 
+def rear_camera(log: Recorder) -> None:
+    log.ros(
+        "/rear/image_raw",
+        "sensor_msgs/msg/Image",
+        ROS.image(BASE_NS, label_picture(0), "mono8", frame_id="rear"),
+        BASE_NS,
+    )
+
+
 def changing(stamp: int) -> bytes:
     return info(stamp) if stamp < stamp_of(12) else info(stamp, k=(33.0, 0, 15.5, 0, 33, 11.5, 0, 0, 1))
 
@@ -130,6 +139,11 @@ BROKEN: dict[str, tuple[str, Robot]] = {
     ),
     "map-impossible": ("no depth and no poses", replace(HEALTHY, depth=lambda i: None, poses=nothing, static=nothing)),
     "truth-missing": ("no label images", replace(HEALTHY, labels=lambda i: None)),
+    "truth-other-camera": (
+        "/gt/labels (frame 'rear') belongs to /rear/image_raw and not to /cam/color/image_raw (frame 'camera')",
+        replace(HEALTHY, labels_frame="rear", others=rear_camera),
+    ),
+    "truth-shape": ("/gt/labels is 20x24", replace(HEALTHY, labels=lambda i: label_picture(i)[:, :20].copy())),
     "truth-no-table": ("/gt/labels", replace(HEALTHY, tables=())),
     "truth-two-tables": ("changes its class table 1 times", replace(HEALTHY, tables=({0: "sky"}, NAMES))),
     "truth-unknown-ids": ("outside the class table", replace(HEALTHY, labels=lambda i: label_picture(i, classes=4))),

@@ -182,14 +182,47 @@ def test_yes_means_colour_pixels_whatever_the_log_says(recorder: Callable[..., R
         assert "being of another shape: depth is not used" in opened.info.warnings[0]
 
 
-def test_aligned_by_name_is_registered_in_any_frame(recorder: Callable[..., Recorder]) -> None:
+@pytest.mark.parametrize("frame_id", ["color_optical", "depth_optical"])
+def test_aligned_by_name_is_registered_unless_the_log_says_how_far_it_is(
+    recorder: Callable[..., Recorder], frame_id: str
+) -> None:
+    """Drivers that align depth give it colour's frame; one that only says so is believed while nothing contradicts."""
     log = recorder()
-    rig(log, RIG)
+    if frame_id == "color_optical":
+        rig(log, RIG)
     color(log, DEPTH)
-    depth(log, METRES, DEPTH, name="aligned_depth_to_color")
+    depth(log, METRES, DEPTH, name="aligned_depth_to_color", frame_id=frame_id)
     with open_log([log.close()]) as opened:
         np.testing.assert_array_equal(depth_of(opened), METRES)
         assert not any("registered" in warning for warning in opened.info.warnings)
+
+
+def test_registered_by_name_in_the_frame_of_the_other_eye(recorder: Callable[..., Recorder]) -> None:
+    """A stereo camera registers depth to its left eye; for the right one it is projected."""
+    log = recorder()
+    rig(log, RIG)
+    color(log, DEPTH)
+    depth(log, METRES, DEPTH, name="depth_registered")
+    with open_log([log.close()]) as opened:
+        np.testing.assert_allclose(depth_of(opened), register_depth(METRES, DEPTH, DEPTH, RIG), rtol=1e-5)
+        assert any("(0.051 m apart)" in warning for warning in opened.info.warnings)
+
+
+@pytest.mark.parametrize("name", ["depth", "depth_registered"])
+def test_depth_of_another_camera_is_not_taken_for_that_of_colour(recorder: Callable[..., Recorder], name: str) -> None:
+    """In the frame of another camera, of the same size, and no extrinsic: only when it is asked for."""
+    log = recorder()
+    color(log, DEPTH)
+    grey = picture(0, DEPTH.width, DEPTH.height)[..., 0].copy()
+    log.ros("/eye/image_raw", IMAGE, ROS.image(BASE_NS, grey, "mono8", frame_id="depth_optical"), BASE_NS)
+    depth(log, METRES, DEPTH, name=name)
+    path = log.close()
+    with open_log([path]) as opened:
+        assert depth_of(opened) is None
+        assert any("belongs to /eye/image_raw, not to /cam/color/image_raw" in text for text in opened.info.warnings)
+    for how in ({"topics": {"depth": f"/cam/{name}/image_rect_raw"}}, {"depth_registered": "yes"}):
+        with open_log([path], **how) as opened:  # type: ignore[arg-type]
+            np.testing.assert_array_equal(depth_of(opened), METRES)
 
 
 def test_one_frame_with_two_calibrations_is_a_rig_of_zero_length(recorder: Callable[..., Recorder]) -> None:

@@ -168,6 +168,16 @@ CHECKS = (
         parts.truth_missing,
     ),
     Check(
+        "truth-other-camera",
+        "the only label images are those of another camera",
+        "Take that camera with --topic color=TOPIC, or record labels with the frame id of the colour images.",
+    ),
+    Check(
+        "truth-shape",
+        "label images have another shape than those of colour",
+        "Record labels of the whole image; cut or fill them up by what is missing at each side.",
+    ),
+    Check(
         "truth-no-table",
         "there are label images, but no names of classes",
         "Give --classes FILE, or record the table as vision_msgs/LabelInfo.",
