@@ -70,6 +70,7 @@ class Robot:
 
     stamp: Callable[[int], int] = stamp_of
     color: Callable[[int], Array] = picture
+    color_frame: str = "camera"
     color_stamp: Callable[[int], int] = lambda stamp: stamp
     color_log: Callable[[int], int] = lambda stamp: stamp + 5 * MS
     depth: Callable[[int], Array | None] = depth_picture
@@ -102,7 +103,7 @@ class Robot:
         stamp = self.stamp(i)
         if (payload := self.info(stamp)) is not None:
             log.ros(self.info_topic, INFO, payload, stamp + 4 * MS)
-        color = ROS.image(self.color_stamp(stamp), self.color(i), "rgb8")
+        color = ROS.image(self.color_stamp(stamp), self.color(i), "rgb8", frame_id=self.color_frame)
         log.ros("/cam/color/image_raw", IMAGE, color, self.color_log(stamp))
         if (depth := self.depth(i)) is not None:
             encoded = ROS.image(

@@ -215,6 +215,16 @@ def test_findings_about_bytes(tmp_path: Path) -> None:
     assert names(path, topics={"pose": "/p"}) == {"pose-unreadable", "damage"}
 
 
+@pytest.mark.parametrize(("frame", "found"), [("camera_link", True), ("camera_optical_frame", False)])
+def test_images_in_a_frame_of_body_axes(tmp_path: Path, frame: str, found: bool) -> None:
+    """The chain leads to the frame of the images, but a driver stamped them with the mount's."""
+    robot = replace(HEALTHY, static=mount("base", frame), color_frame=frame, depth_frame=frame, labels_frame=frame,
+                    info=lambda stamp: info(stamp, frame_id=frame))  # fmt: skip
+    findings = inspected(robot.record(tmp_path / "log.mcap")).findings
+    assert [finding.name for finding in findings] == ["pose-body-frame"] * found
+    assert all(f"in frame {frame!r}, whose z axis points up in 'world'" in finding.what for finding in findings)
+
+
 def test_every_check_is_tested() -> None:
     elsewhere = {"unprotected", "damage", "file-unfinished", "depth-undecodable", "pose-unreadable"}
     assert {check.name for check in CHECKS if check.do} == BROKEN.keys() | elsewhere

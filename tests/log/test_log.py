@@ -164,7 +164,7 @@ def test_labels_without_a_table_and_a_table_without_labels(recorder: Callable[..
 
 def test_ids_outside_the_table_are_ignored_and_said(recorder: Callable[..., Recorder]) -> None:
     log = recorder()
-    truth = np.array([[0, 7], [9, 255]], np.uint8)
+    truth = np.array([[0, 7, 0, 0], [9, 255, 0, 0], [0, 0, 0, 0]], np.uint8)
     for i in range(2):
         color(log, i)
         labels(log, i, truth)
@@ -173,7 +173,7 @@ def test_ids_outside_the_table_are_ignored_and_said(recorder: Callable[..., Reco
         for _ in range(2):
             got = opened.truth(0)
             assert got is not None
-            assert got.tolist() == [[0, 1], [255, 255]]
+            assert got.tolist() == [[0, 1, 0, 0], [255, 255, 0, 0], [0, 0, 0, 0]]
         assert opened.info.warnings == (
             "1 pixels in 1 label images have an id or colour outside the class table: ignored.",
         )  # fmt: skip

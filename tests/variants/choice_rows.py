@@ -19,6 +19,7 @@ from tape import (
     labels,
     millimetres,
     rgb8,
+    together,
 )
 from variant import Variant
 
@@ -38,6 +39,15 @@ def black(encoding: str, dtype: str = "u1", channels: int = 1, **options: Any) -
 def png(make: Any, stamp_ns: int, view: View) -> Encoded:
     """Colour as png."""
     return make.compressed(stamp_ns, encoded(".png", view.rgb), "png")
+
+
+def empty(fmt: str, head: int = 0) -> Draw:
+    """Depth that is nowhere known, as a png behind a head of zeros."""
+
+    def draw(make: Any, stamp_ns: int, view: View) -> Encoded:
+        return make.compressed(stamp_ns, bytes(head) + encoded(".png", np.zeros(view.labels.shape, "<u2")), fmt)
+
+    return draw
 
 
 def beside(topic: str, draw: Draw) -> Part:
@@ -62,6 +72,9 @@ CHOICE_ROWS = (
     Variant("choice-most", "half as many compressed ones: the raw one", more=seldom(beside(COMPRESSED, RGB))),
     Variant("choice-colour-word", "another camera without a colour word in its topic",
             more=beside(LEFT, black("mono8"))),
+    Variant("choice-grey", "a grey image of the same camera", more=beside("/cam/color/image_mono", black("mono8"))),
+    Variant("choice-mosaic", "the mosaic of the same camera, before anybody made colours of it",
+            color=color(rgb8, "/cam/color/image_color"), more=beside(COLOR, black("bayer_rggb8"))),
     Variant("choice-infrared", "an infrared camera", more=beside("/cam/infra1/image_rect_raw", black("mono8"))),
     Variant("choice-two-cameras", "a second colour camera, `--topic color=`", more=beside("/rear/color/image_raw", RGB),
             opened={"topics": {"color": COLOR}}),
@@ -75,6 +88,12 @@ CHOICE_ROWS = (
     Variant("choice-aligned", "depth as the sensor saw it beside aligned depth",
             depth=depth(millimetres, "/cam/aligned_depth_to_color/image_raw"),
             more=beside(DEPTH, black("16UC1", "<u2", frame_id="depth_optical"))),
+    Variant("choice-depth-transports", "depth as png and compressedDepth beside raw",
+            more=together(beside(f"{DEPTH}/compressed", empty("16UC1; png compressed")),
+                          beside(f"{DEPTH}/compressedDepth", empty("16UC1; compressedDepth png", 12)))),
+    Variant("choice-labels-of-another", "labels of another camera beside those of colour",
+            more=together(beside("/rear/image_raw", black("mono8", frame_id="rear")),
+                          beside("/rear/semantic", black("mono8", frame_id="rear")))),
     Variant("choice-asked", "every role by `--topic`",
             color=color(rgb8, "/a"), depth=depth(millimetres, "/b"), labels=labels(lambda m, t, v: m.image(
                 t, v.labels, "mono8"), "/c"), more=beside("/d/rgb", RGB),

@@ -127,8 +127,9 @@ CHECKS = (
     ),
     Check(
         "pose-body-frame",
-        "poses are those of the robot's body, and nothing says how the camera sits on it",
-        "Record tf_static from the body to the camera's optical frame.",
+        "poses are those of a body (x forward, z up), and nothing says how the camera sits on it",
+        "Record tf_static from the body to the camera's optical frame, and stamp the images with that frame.",
+        parts.pose_body_frame,
     ),
     Check(
         "pose-tree",

@@ -7,6 +7,7 @@ from stsem.log.doctor.summaries import CameraSummary, DepthSummary, FramesSummar
 from stsem.log.info import LogInfo
 from stsem.log.remark import Remark
 from stsem.log.tracks import Int64
+from stsem.pose import Trajectory
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,13 @@ class Examined:
     Args:
         info: with everything that was said while the log was opened and its frames were looked at.
         stamps_ns: (n,) of the colour frames, ascending.
+        path: the camera's; None without poses.
         frames, camera, depth, truth, pose: the summaries; None where the log has no such thing.
     """
 
     info: LogInfo
     stamps_ns: Int64
+    path: Trajectory | None
     frames: FramesSummary
     camera: CameraSummary | None
     depth: DepthSummary | None

@@ -68,6 +68,7 @@ def inspect_log(log: Log, *, full: bool = False) -> Inspection:
     examined = Examined(
         info=info,
         stamps_ns=np.array([plan.stamp_ns for plan in log.plans], np.int64),
+        path=path,
         frames=frames_summary(log, seen),
         camera=camera_summary(info, log.camera) if log.camera else None,
         depth=depth_summary(info, seen) if info.choice.depth else None,

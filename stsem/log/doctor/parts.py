@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from stsem.log.doctor.finding import Examined
+from stsem.log.poses.body import has_body_axes
 
 MIN_PAIRED = 0.9
 """Of the frames: one in ten without a partner is more than what a recorder drops at its ends."""
@@ -73,6 +74,17 @@ def pose_still(seen: Examined) -> Iterator[str]:
     yield (
         f"The pose does not change: {pose.samples} samples in {pose.span_s:.1f} s lie within "
         f"{pose.extent_m * 1000:.2f} mm and {pose.turn_deg:.2f} degrees."
+    )
+
+
+def pose_body_frame(seen: Examined) -> Iterator[str]:
+    """Images that are stamped with a frame of body axes."""
+    frames = seen.info.pose_frames
+    if seen.path is None or not frames or seen.said("pose-body-frame") or not has_body_axes(frames[-1], seen.path):
+        return
+    yield (
+        f"The colour images are in frame {frames[-1]!r}, whose z axis points up in {frames[0]!r} as a body's does; a "
+        "camera looks along z of its optical frame (z forward, y down): the map is turned by 90 degrees."
     )
 
 

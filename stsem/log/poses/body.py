@@ -23,6 +23,8 @@ _BODY = re.compile("|".join(BODY_NAMES))
 MIN_SAMPLES, MIN_PATH_M = 20, 1.0
 MIN_ALONG_X = 0.8
 MIN_UPRIGHT = 0.9
+_OPTICAL = re.compile(r"optical(_frame)?$")
+_LINK = re.compile(r"_(link|base|mount)$")
 
 
 def is_body_name(frame: str) -> bool:
@@ -46,3 +48,17 @@ def looks_like_body_frame(trajectory: Trajectory) -> bool:
         return False
     upright = float((np.abs(rotations[:, 2, 2:]) * lengths).sum()) / path
     return upright > MIN_UPRIGHT and float(np.abs(steps[..., 0]).sum()) / path > MIN_ALONG_X
+
+
+def has_body_axes(frame: str, trajectory: Trajectory) -> bool:
+    """Whether a camera's poses are those of a frame with x forward and z up: REP 103's, and not of optical axes.
+
+    Its z axis points up all the way, and it either has the name of a link, or moves along its own x axis. A frame that
+    is named optical has optical axes. A camera that looks at the ceiling has z up, too: hence the second condition.
+    """
+    name = frame.split("/")[-1].lower()
+    if _OPTICAL.search(name) or not len(trajectory):
+        return False
+    if not (is_body_name(name) or _LINK.search(name) or looks_like_body_frame(trajectory)):
+        return False
+    return bool((trajectory.poses[:, 2, 2] > MIN_UPRIGHT).all())
