@@ -26,7 +26,7 @@ from stsem.log.roles import Roles, choose_roles
 from stsem.log.scan import Scan
 from stsem.log.schemas.messages import Kind
 from stsem.log.sizes import usual_size
-from stsem.log.stamps import clock_offsets, clock_warnings, refuse_restarted
+from stsem.log.stamps import clock_offsets, clock_warnings, on_one_clock, refuse_restarted
 from stsem.log.tracks import Track
 
 
@@ -95,7 +95,7 @@ def assemble(
         warnings=list(roles.warnings),
     )  # fmt: skip
     _refuse_unrelated(scan.files, result.color)
-    refuse_restarted(result.color)
+    refuse_restarted(result.color, scan.files)
     result.size = _size(result.color)
     _check_shape(result, roles.labels)
     _find_classes(result, scan, classes_file)
@@ -209,6 +209,9 @@ def _note_troubles(result: Assembly, tracks: Sequence[Track]) -> None:
 
 
 def _check_clocks(result: Assembly, tracks: Sequence[Track]) -> None:
+    result.depth, of_depth = on_one_clock(result.color, result.depth)
+    result.labels, of_labels = on_one_clock(result.color, result.labels)
+    result.warnings += of_depth + of_labels
     channels = [channel for channel in (result.color, result.depth, result.labels) if channel]
     posing = [track for track in tracks if track.topic == result.pose_topic]
     result.clock_offsets_ns = clock_offsets(channels, result.poses)

@@ -16,7 +16,7 @@ from stsem.frame import Depth, Frame, Image
 from stsem.log.assemble import Assembly, assemble
 from stsem.log.classtable import Translator
 from stsem.log.container.damage import Damage
-from stsem.log.container.files import Given, find_files, left_out
+from stsem.log.container.files import Given, find_files, left_out, missing_files
 from stsem.log.container.store import Store
 from stsem.log.describe import channel_infos, describe
 from stsem.log.info import ChannelInfo, LogInfo
@@ -85,7 +85,10 @@ def scan_log(paths: Sequence[Given], progress: Callable[[int, int], None] | None
     Raises:
         LogError: nothing can be read.
     """
-    return ScannedLog(paths, scan(find_files(paths), progress))
+    scanned = scan(find_files(paths), progress)
+    for name in missing_files(paths):
+        scanned.damage.count("missing_file", name)
+    return ScannedLog(paths, scanned)
 
 
 class ScannedLog:

@@ -1,11 +1,23 @@
 """What the stamps of a log's channels tell when they are set side by side: offsets taken out, and warnings."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from stsem.errors import LogError
-from stsem.log.clocks import RESET_NS, clock_offset_ns, find_resets, out_of_range
+from stsem.log.clocks import (
+    AHEAD_NS,
+    RESET_NS,
+    Reset,
+    clock_offset_ns,
+    find_resets,
+    find_resets_in_file,
+    foreign_clock_ns,
+    out_of_range,
+    smallest_offset_ns,
+)
+from stsem.log.container.files import File
 from stsem.log.plan import depth_limit_ns, truth_limit_ns
 from stsem.log.poses.source import PoseSource
 from stsem.log.reading import ImageChannel
@@ -14,6 +26,8 @@ from stsem.log.tracks import Float64, Int64, References, Track
 
 MIN_GAP_NS = 1_000_000_000
 GAP_PERIODS = 10
+LONG_GAP_NS = 60_000_000_000
+"""No disk or queue holds a recorder up for longer."""
 SKEW_SPREAD_NS = 5_000_000
 """Two channels whose stamps lie evenly apart, to this, are on two clocks."""
 
@@ -35,39 +49,111 @@ def clock_warnings(
         Remark(
             "clock-offset",
             f"The clock of {topic} is off: its log times are {offset / 1e9:.3f} s behind its stamps or more; "
-            "taken out.",
+            f"taken out{_dated_ahead(topic, color, others, offsets_ns)}.",
         )
         for topic, offset in offsets_ns.items()
     ]
-    warnings += _odd_frames(color)
+    if depth is not None:
+        warnings += _late(color, depth)
+    images = [channel.track for channel in (depth, labels) if channel is not None]
+    warnings += _odd_frames(color, [*images, *others])
     for channel, limit_ns in ((depth, depth_limit_ns), (labels, truth_limit_ns)):
         if channel is not None:
             warnings += _set_back(channel)
             warnings += _skewed(color.rows, channel, limit_ns(color.rows, channel.rows))
-    images = [channel.track for channel in (color, depth, labels) if channel is not None]
-    return warnings + _unstamped([*images, *others])
+    return warnings + _unstamped([color.track, *images, *others])
 
 
-def refuse_restarted(color: ImageChannel) -> None:
+def _dated_ahead(topic: str, color: ImageChannel, poses: Sequence[Track], offsets_ns: Mapping[str, int]) -> str:
+    """What poses from the future mean, when the images are not from there."""
+    if not any(track.topic == topic for track in poses) or color.topic in offsets_ns or offsets_ns[topic] > -AHEAD_NS:
+        return ""
+    return "; unless poses are dated ahead on purpose, they are that far off the images"
+
+
+def _late(color: ImageChannel, depth: ImageChannel) -> list[str]:
+    """Depth that always comes later than colour by as much as a computation may take: it, or another clock."""
+    if not len(depth) or np.isin(depth.rows.stamp_ns, color.rows.stamp_ns).any():
+        return []
+    later = smallest_offset_ns(depth.rows) - smallest_offset_ns(color.rows)
+    spread = float(np.ptp(np.percentile(depth.rows.log_ns - depth.rows.stamp_ns, (5, 95))))
+    if later <= AHEAD_NS or spread > SKEW_SPREAD_NS or clock_offset_ns(depth.rows) or clock_offset_ns(color.rows):
+        return []
+    sentence = (
+        f"{depth.topic} is logged {later / 1e9:.3f} s later behind its stamps than {color.topic}, evenly: if nothing "
+        "computes for so long, its clock is behind, and pairs are of images that far apart."
+    )
+    return [Remark("clock-skew", sentence)]
+
+
+def on_one_clock(color: ImageChannel, other: ImageChannel | None) -> tuple[ImageChannel | None, list[str]]:
+    """(a channel with its stamps on the clock of colour, or None if it cannot be used; a sentence if they were not).
+
+    They meet colour by stamps, so that is where the difference is taken out; its log times stay. When it is colour that
+    is not in step with the recorder, poses are on another clock, too, and nothing can be made of both.
+    """
+    shift_ns = foreign_clock_ns(color.rows, other.rows) if other is not None else 0
+    if other is None or not shift_ns:
+        return other, []
+    own, foreign = (smallest_offset_ns(channel.rows) for channel in (color, other))
+    sentence = (
+        f"{other.topic} and {color.topic} are on two clocks: log times are {foreign / 1e9:.3f} s and {own / 1e9:.3f} s "
+        "behind their stamps or more; "
+    )
+    if own < -AHEAD_NS:
+        sentence += "the second is ahead of the recorder, so no pair can be trusted, and the first is not used."
+        return None, [Remark("clock-skew", sentence)]
+    other.rows = replace(other.rows, stamp_ns=other.rows.stamp_ns + shift_ns)
+    sentence += f"{shift_ns / 1e9:+.3f} s is added to the stamps of the first, to within what transport differs."
+    return other, [Remark("clock-skew", sentence)]
+
+
+def refuse_restarted(color: ImageChannel, files: Sequence[File]) -> None:
     """Frames go by their stamps; two passes over the same stamps would be shuffled into one.
 
     Raises:
         LogError: the clock of the colour camera was set back.
     """
-    resets = find_resets(*_stamped(color))
+    resets = find_resets(*_stamped(color)) or _resets_in_files(color, files)
     if not resets:
         return
     first = resets[0]
     times = "" if len(resets) == 1 else f", {len(resets)} times in all"
     raise LogError(
         f"The clock of {color.topic} was set back by {first.back_ns / 1e9:.3f} s at log time {first.log_ns} ns{times}, "
-        "so its stamps come twice; cut the log there, for example with mcap filter, and give the parts one by one."
+        f"{_how_to_cut(first)}"
     )
 
 
-def _odd_frames(color: ImageChannel) -> list[str]:
+def _how_to_cut(reset: Reset) -> str:
+    if reset.twice_ns is None:
+        return (
+            "so its stamps come twice; cut the log there, for example with mcap filter, and give the parts one by one."
+        )
+    since, until = reset.twice_ns
+    if since > until:
+        return (
+            f"and the recorder's with it; cut the log at {since} ns, for example with mcap filter, and give the parts "
+            "one by one: the later one was recorded first."
+        )
+    return (
+        f"and the recorder's with it, so log times from {since} to {until} ns come twice; cut them out, for example "
+        "with mcap filter, and give what is before and what is behind them one by one."
+    )
+
+
+def _resets_in_files(channel: ImageChannel, files: Sequence[File]) -> tuple[Reset, ...]:
+    """Steps back in the order of each file: a recorder writes as time goes on, whatever its clock says."""
+    rows = channel.rows
+    order = np.lexsort((rows.offset, rows.place))
+    borders = np.searchsorted(rows.place[order], [file.base for file in files])
+    parts = np.split(order, borders[1:])
+    return tuple(reset for part in parts for reset in find_resets_in_file(rows.stamp_ns[part], rows.log_ns[part]))
+
+
+def _odd_frames(color: ImageChannel, others: Sequence[Track]) -> list[str]:
     """Repeated stamps and gaps."""
-    stamps = color.rows.stamp_ns
+    stamps, logs = color.rows.stamp_ns, color.rows.log_ns
     warnings: list[str] = []
     steps = np.diff(stamps)
     if not len(steps):
@@ -80,9 +166,24 @@ def _odd_frames(color: ImageChannel) -> list[str]:
         longest = int(gaps[steps[gaps].argmax()])
         at = (int(stamps[longest]) - int(stamps[0])) / 1e9
         times = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
-        sentence = f"{color.topic} has {times} of {steps[longest] / 1e9:.3f} s at t = {at:.3f} s."
+        why = _why_gap(int(steps[longest]), int(logs[longest + 1] - logs[longest]), others)
+        sentence = f"{color.topic} has {times} of {steps[longest] / 1e9:.3f} s at t = {at:.3f} s{why}."
         warnings.append(Remark("gaps", sentence))
     return warnings
+
+
+def _why_gap(gap_ns: int, log_gap_ns: int, others: Sequence[Track]) -> str:
+    """What stopped, as far as the other channels tell: the camera, the recorder, or only the clock."""
+    if 2 * log_gap_ns < gap_ns:
+        return f", in {log_gap_ns / 1e9:.3f} s of log time: its clock was set forward"
+    gaps = [track.largest_gap_ns for track in others if track.count > 1]
+    if not gaps:
+        return ""
+    if 2 * min(gaps) < log_gap_ns:
+        return ", while other channels went on: the camera, its driver or its connection stopped"
+    if log_gap_ns > LONG_GAP_NS:
+        return ", as have the other channels: recording was paused, or the clock was set forward"
+    return ", as have the other channels: recording was paused, or the disk or the queue of the recorder held it up"
 
 
 def _set_back(channel: ImageChannel) -> list[str]:
@@ -103,12 +204,8 @@ def _unstamped(tracks: Sequence[Track]) -> list[str]:
     for track in tracks:
         if not track.unstamped:
             continue
-        offsets = track.stamp_offsets_ns()
-        off = np.median(offsets[offsets != 0]) / 1e9 if (offsets != 0).any() else 0.0
-        far = f", which is {off:.3f} s off the stamps of the others" if out_of_range(round(off * 1e9)) else ""
         sentence = (
-            f"{track.unstamped} of {track.count} messages on {track.topic} have no capture stamp: "
-            f"their log time is used{far}."
+            f"{track.unstamped} of {track.count} messages on {track.topic} have no capture stamp: {track.stand_in}."
         )
         warnings.append(Remark("clock-unstamped", sentence))
     return warnings

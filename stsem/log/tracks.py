@@ -12,6 +12,8 @@ from mcap.records import Schema
 from stsem.log.container.damage import Damage
 from stsem.log.schemas.messages import Calibration, ClassNames, Decoded, Kind, Transform
 from stsem.log.schemas.table import TABLE, MessageReader, Row, StampReader, why_not
+from stsem.log.unstamped import stand_in
+from stsem.packed import packed_time
 from stsem.plain import plain
 
 Int64 = npt.NDArray[np.int64]
@@ -30,7 +32,7 @@ class References:
     """Where the messages of a channel are, ordered by (stamp, log time, position in the file); (n,) int64 each.
 
     Args:
-        stamp_ns: capture stamp, the log time where the sensor gave none.
+        stamp_ns: capture stamp, or what stands in for it (`unstamped.py`) where the sensor gave none.
         log_ns: log time.
         place: bytes from the front of the log to the chunk, or to the message itself when it is in no chunk.
         offset: of the payload inside the decompressed chunk, or inside the log when it is in no chunk.
@@ -58,15 +60,15 @@ class Samples:
         return len(self._times) // 2
 
     def add(self, transform: Transform, log_ns: int) -> None:
-        """Take in one; without a stamp its log time counts."""
-        self._times.extend((log_ns if transform.stamp_ns is None else transform.stamp_ns, log_ns))
+        """Take in one, with a stamp or without."""
+        self._times.extend((packed_time(transform.stamp_ns), log_ns))
         self._values.extend((*transform.translation, *transform.quaternion))
 
     def arrays(self) -> tuple[Int64, Int64, Float64, Float64]:
         """(stamps (n,), log times (n,), translations (n, 3), quaternions (n, 4) x y z w)."""
         times = _as_int64(self._times).reshape(-1, 2)
         values = np.asarray(self._values, np.float64).reshape(-1, 7)
-        return times[:, 0], times[:, 1], values[:, :3], values[:, 3:]
+        return stand_in(times[:, 0], times[:, 1])[0], times[:, 1], values[:, :3], values[:, 3:]
 
 
 class Track:
@@ -127,7 +129,7 @@ class Track:
         return self.row is not None and self.row.kind.is_image
 
     def add(self, payload: memoryview, log_ns: int, place: int, offset: int) -> None:
-        """Take in one message, in file order. An image whose stamp cannot be read stays, at its log time."""
+        """Take in one message, in file order. An image whose stamp cannot be read stays, without."""
         self._count(log_ns)
         if self.row is None or self.decode is None:
             return
@@ -140,8 +142,7 @@ class Track:
                 return
         if stamp_ns is None:
             self.unstamped += 1
-            stamp_ns = log_ns
-        _append(self._times, (stamp_ns, log_ns))
+        _append(self._times, (packed_time(stamp_ns), log_ns))
         if self.is_image:
             _append(self._where, (place, offset, len(payload)))
 
@@ -186,7 +187,8 @@ class Track:
         """Where the images are, in order, once all have come in; other messages are not looked up again."""
         if not self.is_image:
             return References(*(np.zeros(0, np.int64) for _ in range(5)))
-        columns = stamp, log, place, offset, _ = [_as_int64(column) for column in (*self._times, *self._where)]
+        log, where = _as_int64(self._times[1]), [_as_int64(column) for column in self._where]
+        columns = stamp, log, place, offset, _ = self._stamps()[0], log, *where
         order = np.lexsort((offset, place, log, stamp))
         if (np.diff(order) == 1).all():  # as they were recorded: nothing is copied
             return References(*columns)
@@ -195,11 +197,19 @@ class Track:
     @property
     def duplicates(self) -> int:
         """Messages that were read and have the stamp of an earlier one; several transforms may share one."""
-        return len(self._times[0]) - len(np.unique(_as_int64(self._times[0])))
+        return len(self._times[0]) - len(np.unique(self._stamps()[0]))
 
     def stamp_offsets_ns(self) -> Int64:
         """(n,) log time minus stamp of every message that was read, in file order."""
-        return _as_int64(self._times[1]) - _as_int64(self._times[0])
+        return _as_int64(self._times[1]) - self._stamps()[0]
+
+    @property
+    def stand_in(self) -> str:
+        """What stands in for stamps that are not there, in a few words; "" when all are."""
+        return self._stamps()[1]
+
+    def _stamps(self) -> tuple[Int64, str]:
+        return stand_in(_as_int64(self._times[0]), _as_int64(self._times[1]))
 
 
 def plausible(stamp_ns: int | None) -> int | None:

@@ -4,20 +4,24 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_up_logs import BASE_NS, LEVEL, NS, ROS, Recorder, label_picture, picture
 
 from stsem.errors import LogError
-from stsem.log.clocks import clock_offset_ns, find_resets
+from stsem.log.clocks import clock_offset_ns, find_resets, find_resets_in_file
 from stsem.log.log import open_log
 from stsem.log.tracks import References
+from stsem.log.unstamped import FROM_ZERO, LOG_TIMES, stand_in
+from stsem.packed import ABSENT
 
 MS = 1_000_000
 IMAGE, TF = "sensor_msgs/msg/Image", "tf2_msgs/msg/TFMessage"
 DEPTH = np.full((24, 32), 1000, "<u2")
 Clock = Callable[[int], int]
+Rows = npt.NDArray[np.int64]
 
 
 def refs(stamps: list[int], logs: list[int]) -> References:
@@ -42,9 +46,10 @@ def test_resets_are_found_whatever_else_is_garbage(passes: list[int], step_ms: i
     """Passes over stamps from 0 on; single garbage stamps, far from each other, are no resets."""
     stamps = [k * step_ms * MS for n in passes for k in range(n)]
     starts = np.cumsum(passes)[:-1]
+    few = len(starts) <= max(1, (len(stamps) - 1) / 10)
     expected = [
         int(i) for i, n in zip(starts, passes, strict=False)
-        if (n - 3) * step_ms * MS - 2 * step_ms * MS > NS
+        if (n - 3) * step_ms - 2 * step_ms > 1000 or (few and (n - 1) * step_ms > max(100, 2 * step_ms))
     ]  # fmt: skip
     logs = list(range(len(stamps)))
     assert [r.log_ns for r in find_resets(np.array(stamps), np.array(logs))] == expected
@@ -54,10 +59,84 @@ def test_resets_are_found_whatever_else_is_garbage(passes: list[int], step_ms: i
         assert find_resets(np.array(stamps), np.array(logs)) == ()
 
 
-def test_order_in_the_file_is_no_reset() -> None:
-    """Two files of one recording, the second read first."""
-    stamps = np.r_[np.arange(50, 100), np.arange(50)] * 100 * MS
-    assert find_resets(stamps, stamps + 5) == ()
+PERIOD = 100 * MS
+IN_ORDER = np.arange(100)
+BLOCKS = IN_ORDER.reshape(10, 10)
+ORDERS = {
+    "halves": np.roll(IN_ORDER, 50),
+    "reversed": IN_ORDER[::-1],
+    "reversed blocks": BLOCKS[::-1].ravel(),
+    "shuffled": np.random.default_rng(1).permutation(100),
+    "shuffled blocks": BLOCKS[np.random.default_rng(2).permutation(10)].ravel(),
+    "a late block": np.r_[0:20, 40:60, 20:40, 60:100],
+    "a late block at the end": np.r_[0:60, 80:100, 60:80],
+    "a late block of three": np.r_[0:20, 23:60, 20:23, 60:100],
+    "one late image": np.r_[0:20, 21:60, 20, 60:100],
+    "two writers": np.r_[0:40:2, 40:80:2, 1:41:2, 80:100:2, 41:100:2],
+}
+
+
+@pytest.mark.parametrize("order", ORDERS.values(), ids=ORDERS.keys())
+def test_order_in_the_file_is_no_reset(order: Rows) -> None:
+    """Messages that changed places, with the jitter and the drops of a real camera."""
+    jitter = np.random.default_rng(3).integers(-10, 10, 100) * MS
+    for kept in (order, order[order % 7 != 3]):
+        stamps = kept * PERIOD + jitter[kept] + BASE_NS
+        assert find_resets(stamps, stamps + 5) == ()
+        assert find_resets_in_file(stamps, stamps + 5) == ()
+
+
+@settings(derandomize=True, max_examples=100, deadline=None)
+@given(
+    before=st.integers(4, 60), behind=st.integers(4, 60), back_ms=st.integers(310, 3_600_000), period_ms=st.just(100)
+)
+def test_a_clock_that_is_set_back_with_the_recorders(before: int, behind: int, back_ms: int, period_ms: int) -> None:
+    """By whatever, except where the second pass ends just before the first begins, as halves do that changed places."""
+    true = np.arange(before + behind) * period_ms * MS + BASE_NS
+    stamps = true - back_ms * MS * (np.arange(before + behind) >= before)
+    between_ms = back_ms - (before + behind - 1) * period_ms
+    found = find_resets_in_file(stamps, stamps + 5)
+    if -period_ms <= between_ms <= 1000:
+        return
+    (reset,) = found
+    assert (reset.log_ns, reset.back_ns) == (stamps[before] + 5, (back_ms - period_ms) * MS)
+    assert reset.twice_ns is not None
+    since, until = reset.twice_ns
+    assert (since > until) == (between_ms > 0)
+    outside = (stamps + 5 < min(since, until + 1)) | (stamps + 5 > max(until, since - 1))
+    inside_both = [((stamps + 5)[half] >= since) & ((stamps + 5)[half] <= until) for half in
+                   (np.arange(len(stamps)) < before, np.arange(len(stamps)) >= before)]  # fmt: skip
+    assert outside.any()
+    assert all(half.any() for half in inside_both) == (since <= until)
+
+
+def test_few_late_messages_are_no_reset() -> None:
+    """One in twelve comes half a second late."""
+    dozen = np.array([0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 5, 11])
+    stamps = np.concatenate([12 * i + dozen for i in range(10)]) * PERIOD
+    assert find_resets_in_file(stamps, stamps) == ()
+    assert find_resets(stamps, np.arange(len(stamps))) == ()
+
+
+STAND_INS = {
+    "all there": ([1000, 1100], [1005, 1105], [1000, 1100], ""),
+    "none there": ([None, None], [1005, 1105], [1005, 1105], LOG_TIMES),
+    "few there": ([None, 1100, None], [1005, 1105, 1205], [1005, 1100, 1205], LOG_TIMES),
+    "few missing": ([1000, None, 1200], [91005, 91105, 91205], [1000, 1100, 1200], "0.090 s is taken from"),
+    "from zero": ([None, 100, 200], [91005, 91105, 91205], [0, 100, 200], FROM_ZERO),
+    "slow from zero": ([None, 100, 200], [90005, 91105, 92205], [0, 100, 200], FROM_ZERO),
+    "far from zero": ([None, 30000, 30100], [91005, 91105, 91205], [29900, 30000, 30100], "0.061 s is taken from"),
+}
+
+
+@pytest.mark.parametrize(("stamps", "logs", "expected", "words"), STAND_INS.values(), ids=STAND_INS.keys())
+def test_what_stands_in_for_stamps(stamps: list[int | None], logs: list[int], expected: list[int], words: str) -> None:
+    """In microseconds."""
+    given_ns = np.array([ABSENT if stamp is None else stamp * 1000 for stamp in stamps])
+    filled, said = stand_in(given_ns, np.array(logs) * 1000)
+    assert (filled // 1000).tolist() == expected
+    assert said.startswith(words)
+    assert bool(said) == bool(words)
 
 
 def record(
@@ -136,9 +215,10 @@ def test_depth_on_another_clock_is_said_with_the_figure(tmp_path: Path) -> None:
         "The stamps of /cam/depth lie evenly 35.0 ms before the nearest colour stamps, more than the 20.0 ms that a "
         "pair may be apart: one of the clocks is off, and pairs are lost.",
     )
-    frames, warnings = opened(record(tmp_path / "far.mcap", color=true, depth=lambda t: t - BASE_NS + NS))
+    uneven = record(tmp_path / "far.mcap", color=true, depth=lambda t: (t - BASE_NS) // 2 + NS)
+    frames, warnings = opened(uneven)
     assert frames == [(False, False)] * 40
-    assert f"on a clock that differs by about -{BASE_NS // NS - 1}.000 s: no frame has any of them" in warnings[-1]
+    assert "s: no frame has any of them" in warnings[-1]
     near = record(tmp_path / "near.mcap", color=true, depth=lambda t: t + 15 * MS, log_of=lambda t: t + 30 * MS)
     assert opened(near) == ([(True, False)] * 40, ())
 
@@ -150,26 +230,124 @@ def test_repeated_stamps_and_gaps_are_said(tmp_path: Path) -> None:
         i = (t - BASE_NS) // (100 * MS)
         return t - 100 * MS if i == 7 else t + 3000 * MS if i >= 20 else t
 
+    def hour_on(t: int) -> int:
+        return t + 3600 * NS * (t >= BASE_NS + 20 * PERIOD)
+
     frames, warnings = opened(record(tmp_path / "log.mcap", color=color, log_of=lambda t: color(t) + MS))
     assert len(frames) == 40
     assert "1 images of /cam/color have the stamp of another one; each is a frame." in warnings
-    assert "/cam/color has a gap of 3.100 s at t = 1.900 s." in warnings
+    assert (
+        "/cam/color has a gap of 3.100 s at t = 1.900 s, as have the other channels: recording was paused, or the disk "
+        "or the queue of the recorder held it up." in warnings
+    )
+    frames, warnings = opened(record(tmp_path / "forward.mcap", color=color))
+    assert "t = 1.900 s, in 0.100 s of log time: its clock was set forward." in "".join(warnings)
+    frames, warnings = opened(record(tmp_path / "hour.mcap", color=hour_on, log_of=hour_on))
+    assert "recording was paused, or the clock was set forward." in "".join(warnings)
 
 
 def test_stamps_of_a_mixed_nature(tmp_path: Path) -> None:
-    """Some of the stamps are zero: their log time counts; on a simulated clock that is far off, and said."""
-    path = record(tmp_path / "log.mcap", color=lambda t: 0 if t % (300 * MS) == 0 else t)
-    frames, warnings = opened(path)
-    assert len(frames) == 40
-    unstamped = sum(1 for i in range(40) if (BASE_NS + i * 100 * MS) % (300 * MS) == 0)
-    assert f"{unstamped} of 40 messages on /cam/color have no capture stamp: their log time is used." in warnings
-    path = record(tmp_path / "far.mcap", color=lambda t: 0 if t == BASE_NS + 100 * MS else t - BASE_NS + NS)
-    frames, warnings = opened(path)
-    assert len(frames) == 40
-    assert any(
-        "1 of 40 messages on /cam/color have no capture stamp: their log time is used, which is 1699999999.005 s off"
-        in warning for warning in warnings
+    """Some of the stamps are zero: as late as the others, whatever their clock; in front of all it is a stamp."""
+
+    def stamps(name: str, color: Clock, **others: Clock) -> tuple[list[int], str]:
+        with open_log([record(tmp_path / name, color=color, **others)]) as log:
+            assert all(plan.depth_log_ns is not None for plan in log.plans)
+            return [plan.stamp_ns for plan in log.plans], "".join(log.info.warnings)
+
+    every = [BASE_NS + i * PERIOD for i in range(40)]
+    found, said = stamps("a.mcap", lambda t: 0 if t % (3 * PERIOD) == 0 else t, depth=true)
+    assert found == every
+    assert "13 of 40 messages on /cam/color have no capture stamp: 0.005 s is taken from their log time, as" in said
+    found, said = stamps(
+        "b.mcap", lambda t: 0 if t == BASE_NS + PERIOD else t - BASE_NS + NS, depth=lambda t: t - BASE_NS + NS
+    )
+    assert found == [stamp - BASE_NS + NS for stamp in every]
+    assert "1 of 40 messages on /cam/color have no capture stamp: 1699999999.005 s is taken from their log time" in said
+    found, said = stamps("c.mcap", lambda t: t - BASE_NS, depth=lambda t: t - BASE_NS)
+    assert found == [stamp - BASE_NS for stamp in every]
+    assert "1 of 40 messages on /cam/depth have no capture stamp: their stamp is 0, where that clock begins." in said
+
+
+@pytest.mark.parametrize("back_ms", [310, 500, 750, 3_600_000])
+def test_a_recorder_whose_clock_is_set_back_is_refused(tmp_path: Path, back_ms: int) -> None:
+    """Log times come twice with the stamps: the order of the file tells."""
+
+    def clock(t: int) -> int:
+        return t - back_ms * MS * (t >= BASE_NS + 20 * PERIOD)
+
+    with pytest.raises(LogError) as caught:
+        open_log([record(tmp_path / "both.mcap", color=clock, log_of=clock)])
+    start, late = BASE_NS + 2000 * MS - back_ms * MS, 5 * MS
+    cut = (
+        f"cut the log at {BASE_NS + late} ns, for example with mcap filter, and give the parts one by one: the later "
+        "one was recorded first." if back_ms > 10_000 else
+        f"so log times from {start + late} to {BASE_NS + 1900 * MS + late} ns come twice; cut them out, for example "
+        "with mcap filter, and give what is before and what is behind them one by one."
     )  # fmt: skip
+    how = "and the recorder's with it; " if back_ms > 10_000 else "and the recorder's with it, "
+    assert str(caught.value) == (
+        f"The clock of /cam/color was set back by {back_ms / 1000 - 0.1:.3f} s at log time {start + late} ns, "
+        f"{how}{cut}"
+    )
+    with pytest.raises(LogError, match="so its stamps come twice; cut the log there"):
+        open_log([record(tmp_path / "stamps.mcap", color=clock)])
+
+
+def test_depth_from_the_future_is_shifted(tmp_path: Path) -> None:
+    """A depth camera whose clock is ahead by whole periods: without a word it would meet the wrong images."""
+    path = record(tmp_path / "log.mcap", color=true, depth=lambda t: t + 400 * MS, labels=true)
+    with open_log([path]) as log:
+        rows = [(plan.color_log_ns, plan.depth_log_ns) for plan in log.plans]
+        assert rows == [(BASE_NS + i * PERIOD + 5 * MS, BASE_NS + i * PERIOD + 5 * MS + 1) for i in range(40)]
+        assert log.info.clock_offsets_ns == {}
+        assert log.info.warnings == (
+            "/cam/depth and /cam/color are on two clocks: log times are -0.395 s and 0.005 s behind their stamps or "
+            "more; -0.400 s is added to the stamps of the first, to within what transport differs.",
+        )
+
+
+@pytest.mark.parametrize(
+    ("color", "depth", "log_of", "words"),
+    [
+        (true, lambda t: t + 90 * MS, true, ""),
+        (true, lambda t: t - 5007 * MS, true, "+5.007 s is added"),
+        (true, lambda t: t - 1203 * MS, true, ""),
+        (lambda t: t + 333 * MS, true, true, "so no pair can be trusted, and the first is not used."),
+        (lambda t: t + 3 * NS, lambda t: t + 2850 * MS, true, ""),
+        (true, true, lambda t: t + 5 * NS, ""),
+        (true, lambda t: t + 400 * MS + (t // PERIOD) % 7 * 40 * MS, true, ""),
+    ],
+    ids=["little", "late", "late and met", "colour ahead", "both ahead", "recorder", "unsteady"],
+)
+def test_which_channels_are_shifted(tmp_path: Path, color: Clock, depth: Clock, log_of: Clock, words: str) -> None:
+    """Only those that cannot be on the clock of colour."""
+    frames, warnings = opened(record(tmp_path / "log.mcap", color=color, depth=depth, log_of=log_of))
+    assert any("are on two clocks" in warning for warning in warnings) == bool(words)
+    assert words in "".join(warnings)
+    if "added" in words:
+        assert frames == [(True, False)] * 40
+    if "not used" in words:
+        assert frames == [(False, False)] * 40
+
+
+def test_depth_that_always_comes_late_is_said(tmp_path: Path) -> None:
+    """A slow computation, or a clock that is behind: nothing tells, so nothing is shifted."""
+    frames, warnings = opened(record(tmp_path / "a.mcap", color=true, depth=lambda t: t - 405 * MS))
+    assert [depth for depth, _ in frames] == [True] * 36 + [False] * 4
+    assert warnings == (
+        "/cam/depth is logged 0.405 s later behind its stamps than /cam/color, evenly: if nothing computes for so "
+        "long, its clock is behind, and pairs are of images that far apart.",
+    )
+
+
+def test_poses_from_the_future_are_said(tmp_path: Path) -> None:
+    log = Recorder(tmp_path / "log.mcap")
+    for i in range(40):
+        at = BASE_NS + i * PERIOD
+        log.ros("/cam/color", IMAGE, ROS.image(at, picture(i), "rgb8"), at + 5 * MS)
+        log.ros("/tf", TF, ROS.tf(at + 300 * MS, [("world", "camera", (0.0, i / 10, 0.0), LEVEL)]), at + 6 * MS)
+    _, warnings = opened(log.close())
+    assert "taken out; unless poses are dated ahead on purpose, they are that far off the images." in warnings[-1]
 
 
 def test_truth_that_comes_late_or_without_stamps(tmp_path: Path) -> None:

@@ -7,12 +7,15 @@ from typing import BinaryIO
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from made_up_logs import BASE_NS, ROS, Recorder
 from mcap.writer import CompressionType
 
 from stsem.errors import LogError
-from stsem.log.container.files import find_files, left_out
+from stsem.log.container.files import find_files, left_out, listed_files, missing_files
 from stsem.log.container.store import Store
+from stsem.log.log import open_log
 from stsem.log.scan import scan
 from stsem.log.tracks import References
 
@@ -122,13 +125,51 @@ def test_links_to_nothing_and_names_that_cannot_be(tmp_path: Path) -> None:
     """A part that was not fetched is not left out in silence."""
     (tmp_path / "run_0.mcap").touch()
     (tmp_path / "run_1.mcap").symlink_to(tmp_path / "annex")
-    for given in (tmp_path, tmp_path / "run_1.mcap"):
+    for path in (tmp_path, tmp_path / "run_1.mcap"):
         with pytest.raises(LogError, match="is a link to nothing"):
-            find_files([given])
+            find_files([path])
     (tmp_path / "loop.mcap").symlink_to(tmp_path / "loop.mcap")
     for name in ("loop.mcap", "x" * 300, "a\0b", "run_0.mcap/x"):
         with pytest.raises(LogError):
             find_files([str(tmp_path / name)])
+
+
+LISTS = {
+    "block": "a:\n  relative_file_paths:\n    - run_0.mcap\n    - run_1.mcap\n  duration: 1\n",
+    "quoted": "relative_file_paths:\r\n- 'run_0.mcap'\r\n- \"run_1.mcap\"\r\n",
+    "flow": "relative_file_paths: [run_0.mcap,\n 'run_1.mcap']",
+    "folders": "relative_file_paths:\n - run/run_0.mcap\n - run/run_1.mcap",
+    "packed": "relative_file_paths:\n - run_0.mcap.zstd\n - run_1.mcap.zstd",
+}
+
+
+@pytest.mark.parametrize("text", LISTS.values(), ids=LISTS.keys())
+def test_files_that_a_recorder_listed(tmp_path: Path, text: str) -> None:
+    """What is not there is missing, unless none is, because all were renamed."""
+    assert listed_files(text) == ("run_0.mcap", "run_1.mcap")
+    (tmp_path / "metadata.yaml").write_bytes(text.encode())
+    (tmp_path / "other.mcap").touch()
+    assert missing_files([tmp_path]) == []
+    (tmp_path / "run_1.mcap").touch()
+    assert missing_files([tmp_path]) == ["run_0.mcap"]
+    assert missing_files([tmp_path / "run_1.mcap"]) == []
+    (tmp_path / "run_0.mcap").touch()
+    assert missing_files([tmp_path]) == []
+
+
+@settings(derandomize=True, max_examples=100, deadline=None)
+@given(st.text("relative_file_paths:[]-'\" \n\rx/.", max_size=200))
+def test_a_list_of_files_is_whatever_it_is(text: str) -> None:
+    assert all("/" not in name and name for name in listed_files(f"relative_file_paths:{text}"))
+    assert listed_files("relative_file_paths:\n" + "- \n" * 100_000) == ()
+
+
+def test_a_log_with_a_file_missing_is_lossy(recorder: Callable[..., Recorder], tmp_path: Path) -> None:
+    images(recorder, 3)
+    (tmp_path / "metadata.yaml").write_text("relative_file_paths:\n- 3.mcap\n- 4.mcap\n")
+    with open_log([tmp_path]) as log:
+        assert str(log.info.damage) == "missing_file 1 (4.mcap)"
+        assert log.info.damage.lossy
 
 
 def test_a_part_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -149,7 +190,7 @@ def test_an_empty_part_is_damage(recorder: Callable[..., Recorder], tmp_path: Pa
     (tmp_path / "4.mcap").touch()
     (tmp_path / "2.mcap").touch()
     result = scan(find_files([tmp_path]))
-    assert result.damage.counts == {"truncated": {"": 2}}
+    assert result.damage.counts == {"truncated": {"2.mcap": 1, "4.mcap": 1}}
     rows = result.tracks["/cam", "cdr", IMAGE].references()
     with Store(result.files, result.chunks) as store:
         assert len(read_all(store, rows)) == 3

@@ -205,3 +205,14 @@ def test_body_frames_are_told_by_the_motion() -> None:
     ]
     _, warnings = find_poses([stamped("/pose", *samples)], None, "cam", COLOR)
     assert "move along their own x axis with z upright" in warnings[0]
+
+
+def test_a_slow_edge_of_a_quick_chain_is_named() -> None:
+    """Corrections at 1 Hz take the poses of odometry at 20 Hz with them."""
+    slow = track("/tf", *((k * 1000 * MS, k * 1000 * MS, "map", "odom", (0.01 * k, 0, 0), LEVEL) for k in range(4)))
+    quick = track("/odom_tf", *((k * 50 * MS, k * 50 * MS, "odom", "cam", (0.01 * k, 0, 0), LEVEL) for k in range(60)))
+    _, (warning,) = find_poses([slow, quick], None, "cam", np.arange(1, 29) * 100 * MS)
+    assert warning.endswith(
+        "(it comes every 1000 ms); odom -> cam comes every 50 ms, so raise the rate of map -> odom, or record odometry "
+        "and take it with --topic pose=TOPIC."
+    )

@@ -2,6 +2,7 @@
 
 | kind | what happened | what is lost |
 |---|---|---|
+| `missing_file` | a file of a split recording that its metadata.yaml lists is not there | the file |
 | `truncated` | the file ends early | everything behind that place |
 | `bad_record` | a record whose length, kind or content cannot be | that record, or the rest of its chunk |
 | `chunk_crc` | a chunk does not have its checksum | the chunk |
@@ -22,18 +23,20 @@ what stands behind the closing magic of the first is `unread_byte`; give them as
 
 import threading
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from stsem.plain import plain
 
 MAX_REMEMBERED = 1 << 20
 KINDS = (
-    "truncated", "bad_record", "chunk_crc", "chunk_unreadable", "lost_message", "unknown_channel", "undecodable",
-    "data_crc", "summary_crc", "attachment_crc", "contradiction", "unread_byte",
+    "missing_file", "truncated", "bad_record", "chunk_crc", "chunk_unreadable", "lost_message", "unknown_channel",
+    "undecodable", "data_crc", "summary_crc", "attachment_crc", "contradiction", "unread_byte",
 )  # fmt: skip
 
 
 class Damage:
-    """Counts of damage by kind and channel; the channel is "" where none can be named.
+    """Counts of damage by kind and channel; where none can be named it is the file of a split recording, or "".
 
     Counting is safe from several threads, and a message that is met twice counts once: so the counts do not depend
     on how often, or in which order, frames were asked for.
@@ -44,12 +47,22 @@ class Damage:
         self._undecodable: set[tuple[str, int, int]] = set()
         self._reasons: dict[str, tuple[int, int, str]] = {}
         self._lock = threading.Lock()
+        self._file = ""
 
     def count(self, kind: str, channel: str = "", n: int = 1) -> None:
         """Add `n` cases of `kind` on `channel`."""
         if n > 0:
             with self._lock:
-                self._counts[kind][channel] += n
+                self._counts[kind][channel or self._file] += n
+
+    @contextmanager
+    def within(self, file: str) -> Iterator[None]:
+        """What is counted inside without a channel is of `file`; one file is walked over at a time."""
+        self._file = file
+        try:
+            yield
+        finally:
+            self._file = ""
 
     def undecodable(self, channel: str, place: int, offset: int, reason: str) -> None:
         """Add the message at (`place`, `offset`) of `channel`, once; from the millionth on they are not told apart."""

@@ -9,10 +9,18 @@ from pathlib import Path
 from stsem.errors import LogError
 from stsem.log.container.source import Source, is_url, local_file, local_path, unreadable
 from stsem.log.remark import Remark
+from stsem.plain import plain
 
 Given = Path | str
 """A path, or as a string also an address such as `https://host/run.mcap`."""
 
+METADATA = "metadata.yaml"
+MAX_METADATA_BYTES = 1 << 20
+MAX_LISTED = 10_000
+_LIST = re.compile(
+    r"^ *relative_file_paths:[ \t]*(?:\[(?P<flow>[^\]]*)\]|\r?\n(?P<block>(?: *- [^\n]*(?:\n|\Z))*))", re.MULTILINE
+)
+_ITEM = re.compile(r"^ *- ([^\r\n]*)", re.MULTILINE)
 _UNFINISHED = (".mcap.active", ".mcap.tmp", ".mcap.part")
 _PACKED = (".mcap.zst", ".mcap.zstd", ".mcap.lz4", ".mcap.gz")
 
@@ -33,7 +41,7 @@ class File:
 def find_files(paths: Sequence[Given]) -> tuple[File, ...]:
     """The .mcap files that `paths` mean, in natural order of their names: files as they are, folders by what they hold.
 
-    The natural order is also the one that a ROS 2 recorder's metadata.yaml states, which is therefore not read.
+    The natural order is also the one that a ROS 2 recorder's metadata.yaml states.
 
     Raises:
         LogError: nothing was given, a path does not exist, or a folder holds no recording.
@@ -61,6 +69,42 @@ def left_out(paths: Iterable[Given]) -> list[str]:
         for path in sorted(folder.iterdir())
         if path.name.lower().endswith(_UNFINISHED)
     ]
+
+
+def missing_files(paths: Iterable[Given]) -> list[str]:
+    """Names of .mcap files that a ROS 2 recorder's metadata.yaml lists and that its folder does not hold.
+
+    Where the folder holds none of those that are listed they were renamed, and the list says nothing.
+    """
+    folders = [path for given in paths if not is_url(given) and (path := local_path(given)).is_dir()]
+    return [name for folder in folders for name in _missing(folder)]
+
+
+def _missing(folder: Path) -> Sequence[str]:
+    path = folder / METADATA
+    try:
+        if not path.is_file():
+            return ()
+        with path.open("rb") as stream:
+            text = stream.read(MAX_METADATA_BYTES).decode("utf-8", "replace")
+        there = {inside.name for inside in folder.iterdir()}
+    except OSError:
+        return ()
+    listed = [name for name in listed_files(text) if name.lower().endswith(".mcap")]
+    return [plain(name) for name in listed if name not in there] if there.intersection(listed) else ()
+
+
+def listed_files(text: str) -> tuple[str, ...]:
+    """The names under `relative_file_paths` of a metadata.yaml, packed ones by the name of what is in them.
+
+    Only this list is looked for, in either way that YAML writes lists; other things, and other texts, give none.
+    """
+    found = _LIST.search(text)
+    if found is None:
+        return ()
+    items = found["flow"].split(",") if found["flow"] is not None else _ITEM.findall(found["block"])
+    names = (item.strip().strip("'\"").rpartition("/")[2] for item in items[:MAX_LISTED])
+    return tuple(dict.fromkeys(re.sub(r"\.zstd?$", "", name) for name in names if name))
 
 
 def natural(name: str) -> tuple[tuple[tuple[bool, int, str], ...], str]:

@@ -223,7 +223,7 @@ CHECKS = (
     ),
     Check(
         "clock-skew",
-        "two channels run on two clocks, so that their images do not meet",
+        "two channels run on two clocks, so that their images do not meet, or not the right ones",
         "Let one computer stamp both, or synchronise their clocks.",
     ),
     Check(
@@ -252,7 +252,7 @@ CHECKS = (
     Check(
         "gaps",
         "colour frames pause for ten periods and a second",
-        "Check the disk and the queue of the recorder; cut long pauses out with --start and --end.",
+        "Mend what stopped, as far as the finding tells; cut long pauses out with --start and --end.",
     ),
     Check(
         "duplicates",

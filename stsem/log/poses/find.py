@@ -86,7 +86,20 @@ def _gap_warning(source: PoseSource, stamps_ns: Int64) -> list[str]:
                 f"apart (it comes every {period_ms:.0f} ms)"
             )
     why = "; ".join(reasons) or "they lie where the pose jumps"
-    return [Remark("pose-missing", f"{count} of {len(stamps_ns)} frames have no pose: {why}.")]
+    return [Remark("pose-missing", f"{count} of {len(stamps_ns)} frames have no pose: {why}{_slow_edge(source)}.")]
+
+
+def _slow_edge(source: PoseSource) -> str:
+    """What to do where one edge of a chain comes too seldom for all the others."""
+    period = {e.name: float(np.median(np.diff(e.trajectory.stamps_ns))) for e in source.moving if len(e.trajectory) > 1}
+    slow = [name for name, ns in period.items() if ns > MAX_GAP_NS]
+    if not slow or len(slow) == len(period):
+        return ""
+    quick = min(period, key=period.__getitem__)
+    return (
+        f"; {quick} comes every {period[quick] / 1e6:.0f} ms, so raise the rate of {' and '.join(slow)}, or record "
+        "odometry and take it with --topic pose=TOPIC"
+    )
 
 
 def _reasons(edge: Edge, stamps_ns: Int64) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
