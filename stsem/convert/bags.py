@@ -70,6 +70,7 @@ def convert_rosbag2(source: Path, out: Path, options: Options, progress: Progres
         for found in _all_files(source, scratch, progress):
             if isinstance(found, Loss):
                 copy.lose(found)
+                expected -= found.count if found.what == rosbag2.MISSING else 0
             else:
                 copy.from_rosbag2(found)
                 expected -= 1

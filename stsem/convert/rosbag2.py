@@ -4,31 +4,36 @@ The tables are read with sqlite3 of the standard library, so that a bag whose me
 too. Message definitions stand in the bag since ROS 2 Iron; for older ones see `definitions.py`.
 """
 
-import os
 import re
 import sqlite3
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
-from urllib.parse import quote
+from typing import Any
 
 import zstandard
 
 from stsem.convert.recording import Loss
-from stsem.errors import ConversionError, OutputError
+from stsem.convert.sqlitefile import SqliteFile, open_sqlite
+from stsem.errors import ConversionError
 from stsem.log.container.files import natural
 from stsem.log.container.records import MAX_RECORD_BYTES
 
 SUFFIX, PACKED_SUFFIX, METADATA = ".db3", ".db3.zstd", "metadata.yaml"
 MAX_MESSAGE_BYTES = MAX_RECORD_BYTES  # what is larger could not be read from the log
-MAX_UNPACKING = 1000
 MAX_METADATA_CHARACTERS = 16 << 20
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _LISTED = re.compile(r"^\s*-\s*[\"']?([^\s\"']+\.(?:db3|mcap)(?:\.zstd)?)[\"']?\s*$", re.MULTILINE)
 _COUNT = re.compile(r"^  message_count:\s*(\d{1,15})\s*$", re.MULTILINE)
-_PIECE = 1 << 20
+_MIN_ROW_BYTES = 8
+_FIRST, _LAST = 0, (1 << 63) - 1
+_FROM = "SELECT rowid, topic_id, timestamp, data FROM messages WHERE rowid >= ? ORDER BY rowid"
+_Row = tuple[Any, ...]
+
+UNCLOSED = "recordings that were not closed, by a write-ahead file or a journal: their last messages may be missing"
+MISSING = "messages in damaged parts of a bag file"
+NO_END = "bag files that are damaged from some message on"
 
 
 @dataclass(frozen=True)
@@ -90,47 +95,99 @@ def messages(path: Path, scratch: Path) -> Iterator[Message | Loss]:
     Raises:
         ConversionError: it is no such file.
     """
-    if path.with_name(f"{path.name}-wal").exists():
-        yield Loss("write-ahead files (-wal) that are not read, as the recorder did not close the bag")
-    with _opened(path, scratch) as (db, size):
+    with open_sqlite(path, scratch, MAX_MESSAGE_BYTES) as file:
         try:
-            topics = _topics(db, size)
-            rows = _rows(db.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY rowid"), size)
+            topics = _topics(file)
+            file.db.execute(f"{_FROM} LIMIT 0", (0,))
         except sqlite3.Error as err:
             raise ConversionError(f"{path} is not a ROS 2 bag in sqlite3 ({err}); give the folder of a bag.") from err
-        yield from _messages(rows, topics)
+        if file.unclosed:
+            yield Loss(UNCLOSED)
+        for row in _rows(file):
+            try:
+                yield row if isinstance(row, Loss) else _message(row[1:], topics)
+            except ValueError as err:
+                yield Loss(str(err))
 
 
-def _rows(found: sqlite3.Cursor, size: int) -> Iterator[tuple[Any, ...]]:
-    """What was found, as long as it fits into a file of `size` bytes: columns may be made up by a formula.
-
-    Raises:
-        sqlite3.Error: it does not, or the file is damaged.
-    """
-    left = size
-    for row in found:
-        left -= sum(len(value) for value in row if isinstance(value, str | bytes))
-        if left < 0:
-            raise sqlite3.DatabaseError("it holds more than its bytes")
+def _rows(file: SqliteFile) -> Iterator[_Row | Loss]:
+    """Rows, as far as they fit into the file."""
+    limit = _Limit(file.size_bytes)
+    for row in _readable(file):
+        if isinstance(row, tuple) and not limit.holds(row):
+            yield Loss(NO_END)
+            return
         yield row
 
 
-def _messages(rows: Iterator[tuple[Any, ...]], topics: dict[int, Topic]) -> Iterator[Message | Loss]:
+def _readable(file: SqliteFile) -> Iterator[_Row | Loss]:
+    """Rows in the order of their numbers; behind damaged pages from the next on that can be read."""
+    last = _FIRST - 1
     while True:
-        try:
-            row = next(rows, None)
-        except (sqlite3.Error, OverflowError):
-            yield Loss("bag files that are damaged from some message on")
+        with suppress(sqlite3.Error, OverflowError):
+            for row in file.db.execute(_FROM, (last + 1,)):
+                if row[0] <= last:
+                    raise sqlite3.DatabaseError("its pages go round in a circle")
+                last = row[0]
+                yield row
             return
+        found = _behind(file.db, last)
+        if found is None:
+            yield Loss(NO_END)
+            return
+        number, row = found
+        yield Loss(MISSING, count=min(number - last - 1, file.size_bytes // _MIN_ROW_BYTES))
         if row is None:
             return
-        try:
-            yield _message(row, topics)
-        except ValueError as err:
-            yield Loss(str(err))
+        last = number
+        yield row
 
 
-def _message(row: tuple[Any, ...], topics: dict[int, Topic]) -> Message:
+_Place = tuple[int, _Row | None]
+"""The number of a row and the row, or the number that follows the last row and None."""
+
+
+def _behind(db: sqlite3.Connection, last: int) -> _Place | None:
+    """The place behind `last` from which on rows can be read again; None when there is none."""
+    step = 1
+    while (found := _place(db, last + step)) is None:
+        step *= 2
+        if last + step > _LAST:
+            return None
+    broken, whole = last + step // 2, last + step
+    while whole - broken > 1:
+        middle = (broken + whole) // 2
+        if nearer := _place(db, middle):
+            whole, found = middle, nearer
+        else:
+            broken = middle
+    return found
+
+
+def _place(db: sqlite3.Connection, number: int) -> _Place | None:
+    """What stands at `number`, or next; None when that cannot be read."""
+    try:
+        row = db.execute(f"{_FROM} LIMIT 1", (number,)).fetchone()
+    except (sqlite3.Error, OverflowError):
+        return None
+    if row is None:
+        return number, None
+    return (row[0], row) if row[0] >= number else None
+
+
+class _Limit:
+    """What is read must fit into the file: columns may be made up by a formula."""
+
+    def __init__(self, size_bytes: int) -> None:
+        self._left = size_bytes
+
+    def holds(self, row: Iterable[Any]) -> bool:
+        """Whether it still does with this row."""
+        self._left -= sum(len(value) for value in row if isinstance(value, str | bytes))
+        return self._left >= 0
+
+
+def _message(row: _Row, topics: dict[int, Topic]) -> Message:
     topic, log_ns, data = topics.get(row[0]), row[1], row[2]
     if topic is None:
         raise ValueError("messages of a topic that the bag does not list")
@@ -151,62 +208,29 @@ def _unpacked(data: bytes) -> bytes:
         raise ValueError("messages that cannot be decompressed") from err
 
 
-def _topics(db: sqlite3.Connection, size: int) -> dict[int, Topic]:
-    tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+def _topics(file: SqliteFile) -> dict[int, Topic]:
+    tables = {name for (name,) in file.db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     if not {"topics", "messages"} <= tables:
         raise sqlite3.DatabaseError("it has no tables of topics and messages")
     definitions: dict[str, tuple[str, str]] = {}
     if "message_definitions" in tables:
         query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-        rows = _rows(db.execute(query), size)
-        definitions = {str(name): (str(encoding), str(text)) for name, encoding, text in rows}
+        definitions = {str(name): (str(encoding), str(text)) for name, encoding, text in _fitting(file, query)}
     query = "SELECT id, name, type, serialization_format FROM topics"
     return {
         number: Topic(str(name), str(type_name), str(serialization), *definitions.get(str(type_name), ()))
-        for number, name, type_name, serialization in _rows(db.execute(query), size)
+        for number, name, type_name, serialization in _fitting(file, query)
     }
 
 
-@contextmanager
-def _opened(path: Path, scratch: Path) -> Iterator[tuple[sqlite3.Connection, int]]:
-    """The data base and its bytes, read only: nothing is written beside the bag."""
-    packed = path.name.endswith(PACKED_SUFFIX)
-    try:
-        if packed:
-            _unpack(path, scratch)
-        unpacked = scratch if packed else path
-        with closing(_connect(unpacked)) as db:
-            yield db, unpacked.stat().st_size
-    finally:
-        if packed:
-            scratch.unlink(missing_ok=True)
+def _fitting(file: SqliteFile, query: str) -> Iterator[_Row]:
+    """What is found.
 
-
-def _connect(path: Path) -> sqlite3.Connection:
-    try:
-        db = sqlite3.connect(f"file:{quote(os.path.abspath(path))}?mode=ro&immutable=1", uri=True)
-    except sqlite3.Error as err:
-        raise ConversionError(f"The bag {path} cannot be opened ({err}).") from err
-    db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_MESSAGE_BYTES)
-    db.execute("PRAGMA trusted_schema = OFF")
-    db.text_factory = lambda data: data.decode(errors="replace")
-    return db
-
-
-def _unpack(path: Path, scratch: Path) -> None:
-    try:
-        with path.open("rb") as packed, scratch.open("wb") as plain:
-            _copy(path, packed, plain)
-    except OSError as err:
-        raise OutputError(f"{path} cannot be unpacked to {scratch} ({err.strerror or err}); make room there.") from err
-
-
-def _copy(path: Path, packed: BinaryIO, plain: BinaryIO) -> None:
-    limit = MAX_UNPACKING * path.stat().st_size
-    try:
-        for piece in zstandard.ZstdDecompressor().read_to_iter(packed, read_size=_PIECE, write_size=_PIECE):
-            if plain.tell() > limit:
-                raise ConversionError(f"{path} unpacks to more than {MAX_UNPACKING} times its size: no bag does.")
-            plain.write(piece)
-    except zstandard.ZstdError as err:
-        raise ConversionError(f"{path} cannot be decompressed ({err}); unpack it with zstd if you can.") from err
+    Raises:
+        sqlite3.Error: it does not fit into the file, or the file is damaged.
+    """
+    limit = _Limit(file.size_bytes)
+    for row in file.db.execute(query):
+        if not limit.holds(row):
+            raise sqlite3.DatabaseError("it holds more than its bytes")
+        yield row

@@ -1,20 +1,25 @@
 """ROS bags: every message byte by byte as rosbags wrote it, also out of damaged bags; definitions that are complete."""
 
 import os
+import shutil
 import sqlite3
+import struct
 import sys
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
+import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from made_up_images import contents, encoded, rgb
 from mcap.reader import make_reader
 
 from stsem.convert import definitions
+from stsem.convert import rosbag2 as rosbag2_reader
 from stsem.convert.bags import convert_rosbag1, convert_rosbag2
 from stsem.convert.recording import Options, Summary
 from stsem.errors import ConversionError, MissingExtraError
@@ -230,36 +235,117 @@ def test_a_flipped_byte_costs_one_chunk(tmp_path: Path) -> None:
     assert 0 < gone == len(stored) - len(found) < len(stored)
 
 
+def long_rosbag2(folder: Path) -> Stored:
+    """A bag of many pages: rows of one, and rows that go over several."""
+    stored = write_rosbag2(folder)
+    more = [("/pose", START_NS + k, os.urandom(300 if k % 3 else 9000)) for k in range(150)]
+    with closing(sqlite3.connect(folder / "drive.db3")) as db, db:
+        (topic,) = db.execute("SELECT id FROM topics WHERE name = '/pose'").fetchone()
+        rows = [(topic, log_ns, data) for _, log_ns, data in more]
+        db.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
+    return stored + more
+
+
 def test_a_damaged_ros2_bag_gives_what_it_holds(tmp_path: Path) -> None:
-    """Pages overwritten in the middle of the file: what was read until then, and the loss."""
-    stored = write_rosbag2(tmp_path / "drive")
+    """Pages overwritten in the middle of the file: what stands before and behind them, and how many are gone."""
+    stored = long_rosbag2(tmp_path / "drive")
+    (tmp_path / "drive/metadata.yaml").unlink()
     path = tmp_path / "drive/drive.db3"
-    with sqlite3.connect(path) as db:
-        for k in range(200):
-            db.execute(
-                "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, ?, ?)", (START_NS + k, os.urandom(999))
-            )
     data = bytearray(path.read_bytes())
-    data[len(data) // 2 : len(data) // 2 + 16384] = b"\xaa" * 16384
+    middle = len(data) // 8192 * 4096
+    data[middle : middle + 16384] = b"\xaa" * 16384
     path.write_bytes(data)
     summary = convert_rosbag2(tmp_path / "drive", tmp_path / "out.mcap", Options(), quietly)
     found = read_back(tmp_path / "out.mcap")
-    assert found[: len(stored)] == stored
-    assert len(stored) < len(found) < len(stored) + 200
-    assert lost(summary)
+    assert found[-1] == stored[-1]
+    gone = [row for row in stored if row not in found]
+    assert summary.losses == {rosbag2_reader.MISSING: len(gone)}
+    assert 0 < len(gone) < 20
+    assert found == [row for row in stored if row not in gone]
 
 
-def test_a_bag_that_was_not_closed_says_so(tmp_path: Path) -> None:
-    """The write-ahead file beside it is neither read nor touched."""
-    write_rosbag2(tmp_path / "drive")
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.8, 0.95, 0.99])
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_cut_ros2_bag_gives_what_it_holds(tmp_path: Path, share: float, packed: bool) -> None:
+    """Whole messages only, and about as many as there are bytes; nothing is written beside the bag."""
+    bag = tmp_path / "drive"
+    stored = long_rosbag2(bag)
+    (bag / "metadata.yaml").unlink()
+    whole = (bag / "drive.db3").read_bytes()
+    cut = whole[: int(len(whole) * share)]
+    (bag / "drive.db3").write_bytes(cut)
+    if packed:
+        (bag / "drive.db3").unlink()
+        (bag / "drive.db3.zstd").write_bytes(zstandard.compress(cut))
+    summary = convert_rosbag2(bag, tmp_path / "out.mcap", Options(), quietly)
+    found = read_back(tmp_path / "out.mcap")
+    assert found == [row for row in stored if row in found]
+    assert len(found) > (share - 0.1) * len(stored)
+    assert summary.losses[rosbag2_reader.NO_END] == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["drive", "out.mcap"]
+    assert len(list(bag.iterdir())) == 1
+
+
+def left_open(path: Path, mode: str, *, commit: bool) -> Stored:
+    """What a recorder leaves that loses its power: the file, and what was to be written to it."""
+    more = [("/pose", START_NS + k, os.urandom(9000)) for k in range(40)]
+    with closing(sqlite3.connect(path)) as db:
+        (topic,) = db.execute("SELECT id FROM topics WHERE name = '/pose'").fetchone()
+        db.execute(f"PRAGMA journal_mode = {mode}")
+        db.execute("PRAGMA cache_size = 4")
+        db.execute("PRAGMA wal_autocheckpoint = 0")
+        rows = [(topic, log_ns, data) for _, log_ns, data in more]
+        db.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
+        if commit:
+            db.commit()
+        kept = {part: part.read_bytes() for part in path.parent.iterdir() if part.name[-4:] in (".db3", "-wal", "rnal")}
+    for part, data in kept.items():
+        part.write_bytes(data)
+    assert len(kept) == 2
+    return more
+
+
+@pytest.mark.parametrize(("mode", "commit"), [("wal", True), ("wal", False), ("delete", False)])
+def test_a_bag_that_was_not_closed_gives_what_was_finished(tmp_path: Path, mode: str, commit: bool) -> None:
+    """What stands in the write-ahead file only is there, a half-written change is not; the bag stays as it is."""
+    bag = tmp_path / "drive"
+    stored = write_rosbag2(bag)
+    more = left_open(bag / "drive.db3", mode, commit=commit)
+    before = contents(bag)
+    summary = convert_rosbag2(bag, tmp_path / "out.mcap", Options(), quietly)
+    assert read_back(tmp_path / "out.mcap") == stored + (more if commit else [])
+    assert summary.losses == {rosbag2_reader.UNCLOSED: 1}
+    assert contents(bag) == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["drive", "out.mcap"]
+
+
+def test_a_journal_that_names_another_file_does_no_harm(tmp_path: Path) -> None:
+    """sqlite deletes a file that a journal calls its super-journal."""
+    bag, victim = tmp_path / "drive", tmp_path / "victim"
+    write_rosbag2(bag)
+    left_open(bag / "drive.db3", "delete", commit=False)
+    victim.write_bytes(b"dear to somebody")
+    name = str(victim).encode()
+    tail = struct.pack(">I", 0x40000000 // 4096 + 1) + name + struct.pack(">II", len(name), sum(name))
+    with (bag / "drive.db3-journal").open("ab") as journal:
+        journal.write(tail + bytes.fromhex("d9d505f920a163d7"))
+    shutil.copytree(bag, tmp_path / "opened")
+    convert_rosbag2(bag, tmp_path / "out.mcap", Options(), quietly)
+    assert victim.exists()
+    with closing(sqlite3.connect(tmp_path / "opened/drive.db3")) as db:
+        db.execute("SELECT count(*) FROM messages").fetchall()
+    assert not victim.exists(), "the danger is not there any more"
+
+
+def test_a_bag_with_a_broken_write_ahead_file_is_read_without(tmp_path: Path) -> None:
+    """It is not touched, and it is said that messages may be missing."""
+    stored = write_rosbag2(tmp_path / "drive")
     (tmp_path / "drive/drive.db3-wal").write_bytes(b"late messages")
+    before = contents(tmp_path / "drive")
     summary = convert_rosbag2(tmp_path / "drive", tmp_path / "out.mcap", Options(), quietly)
-    assert [what for what in summary.losses if "write-ahead" in what]
-    assert sorted(path.name for path in (tmp_path / "drive").iterdir()) == [
-        "drive.db3",
-        "drive.db3-wal",
-        "metadata.yaml",
-    ]
+    assert read_back(tmp_path / "out.mcap") == stored
+    assert summary.losses == {rosbag2_reader.UNCLOSED: 1}
+    assert contents(tmp_path / "drive") == before
 
 
 @pytest.mark.parametrize(
