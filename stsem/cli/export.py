@@ -1,55 +1,80 @@
 """`stsem export`: a training checkpoint, or a network with random weights, as ONNX and sidecar."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from stsem.cli.launch import verb
 
+if TYPE_CHECKING:
+    from stsem.inference.sidecar import Sidecar
+
 HELP = """Export a network to an ONNX file with its sidecar, and check it against torch (needs the extra 'train').
 
     stsem export network.onnx --checkpoint training.pt --sidecar like.toml
     stsem export network.onnx --architecture pspnet-r50 --sidecar like.toml   (random weights, for timing)
+    stsem export --list                                                       (the architectures there are)
 """
 
 
 @verb
 def export(
-    out: Annotated[Path, typer.Argument(metavar="OUT.onnx", help="The file to write; its sidecar goes beside it.")],
+    out: Annotated[
+        Path | None, typer.Argument(metavar="OUT.onnx", help="The file to write; its sidecar goes beside it.")
+    ] = None,
     sidecar: Annotated[
-        Path,
+        Path | None,
         typer.Option("--sidecar", metavar="TOML", help="Size, normalisation, classes and difference to export with."),
-    ],
+    ] = None,
     checkpoint: Annotated[Path | None, typer.Option("--checkpoint", help="Weights and architecture.")] = None,
     architecture: Annotated[
         str | None, typer.Option("--architecture", metavar="NAME", help="Random weights of a network by name.")
     ] = None,
-) -> int:
-    """Exactly one of checkpoint and architecture."""
-    from stsem.errors import MissingExtraError, NetworkError, UsageError
-    from stsem.inference.sidecar import parse
+    passes: Annotated[
+        int,
+        typer.Option(
+            "--uncertainty", metavar="PASSES", min=0,
+            help="Passes of Monte Carlo dropout, for maps of variance, entropy and mutual information; 0 for none.",
+        ),
+    ] = 0,
+    show: Annotated[bool, typer.Option("--list", help="List the architectures with their size and work.")] = False,
+) -> int:  # fmt: skip
+    """Exactly one of checkpoint and architecture, or the list alone."""
+    from stsem.errors import MissingExtraError, UsageError
 
-    if (checkpoint is None) == (architecture is None):
-        raise UsageError("stsem export takes either --checkpoint or --architecture.")
-    if out.suffix != ".onnx":
-        raise UsageError(f"The network is written as {out}, but its name must end in .onnx.")
     try:
+        from stsem.models.cost import table
         from stsem.models.zoo import build
         from stsem.train.publish import load_checkpoint, publish
     except ModuleNotFoundError as err:
         raise MissingExtraError("train", "Exporting a network") from err
-    try:
-        described = parse(sidecar.read_text(encoding="utf-8"), str(sidecar))
-    except OSError as err:
-        raise NetworkError(f"The sidecar {sidecar} cannot be read: {err.strerror}.") from err
+    if show:
+        print(table())
+        return 0
+    if out is None or sidecar is None or (checkpoint is None) == (architecture is None):
+        raise UsageError("stsem export takes OUT.onnx, --sidecar, and either --checkpoint or --architecture.")
+    if out.suffix != ".onnx":
+        raise UsageError(f"The network is written as {out}, but its name must end in .onnx.")
+    described = _described(sidecar)
     classes = len(described.classes)
     if checkpoint is not None:
         network = load_checkpoint(checkpoint, classes)
     else:
         network = build(architecture or "", classes).eval()
-    published = publish(network, described, out)
+    published = publish(network, described, out, passes=passes)
     width, height = published.size
     print(f"Network: {out} ({out.stat().st_size / 1e6:.1f} MB, {classes} classes, {width}x{height})")
     print(f"Replay:  stsem-replay LOG --model {out}")
     return 0
+
+
+def _described(path: Path) -> "Sidecar":
+    from stsem.errors import NetworkError
+    from stsem.inference.sidecar import parse
+
+    try:
+        return parse(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as err:
+        reason = err.strerror if isinstance(err, OSError) else "it is not UTF-8 text"
+        raise NetworkError(f"The sidecar {path} cannot be read: {reason}.") from err

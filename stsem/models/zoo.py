@@ -45,7 +45,9 @@ _PSPNET = Paper("Zhao et al. 2016", "Pyramid Scene Parsing Network", "figure 3")
 
 
 def _paper(how: str) -> Paper:
-    return Paper("the paper", "Semantic Scene Mapping with Spatio-temporal Deep Neural Network", f"figure 3, {how}")
+    return Paper(
+        "Li et al. 2018", "Semantic Scene Mapping with Spatio-temporal Deep Neural Network", f"figure 3, {how}"
+    )
 
 
 def _spatial(depth: int, classes: int, width: float) -> OneStream:

@@ -1,5 +1,6 @@
 """Training: it learns, a stopped one goes on exactly, and what it publishes is what a user loads."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from stsem.errors import NetworkError, TrainingError
 from stsem.frame import Frame
 from stsem.inference.inferencer import Inferencer
 from stsem.inference.sidecar import Difference, Sidecar
+from stsem.models.network import Answers, SegmentationNetwork, SideAnswer
 from stsem.train.augment import Augmentation, view
 from stsem.train.dataset import Pair, PairFolder, class_shares, save_pair
 from stsem.train.loop import Progress, Schedule, Training
@@ -94,6 +96,29 @@ def test_another_training_is_not_continued(pairs: PairFolder, tmp_path: Path) ->
         _training(1).resume(tmp_path / "bad.pt")
     with pytest.raises(NetworkError, match="5 classes"):
         load_checkpoint(tmp_path / "c.pt", 5)
+
+
+def test_a_network_whose_inputs_the_pairs_do_not_give_is_refused() -> None:
+    """A difference that the sidecar does not describe."""
+    still = replace(SIDECAR, difference=None)
+    objective = Objective(torch.ones(3))
+    with pytest.raises(TrainingError, match=r"takes .difference., which these pairs and sidecar do not"):
+        Training("pspnet-r18-temporal-w1", still, objective, Augmentation(SIZE), Schedule(1))
+    Training("pspnet-r18-spatial-w1", still, objective, Augmentation(SIZE), Schedule(1))
+
+
+def test_side_answers_are_judged_on_their_own_grid() -> None:
+    """By hand: one pixel in four of 5x9 labels, the corners those of the grid; an enlarged one counts as the answer."""
+    labels = torch.arange(45).reshape(1, 5, 9) % 3
+    logits = torch.randn(1, 3, 3, 5, generator=torch.Generator().manual_seed(0))
+    p = logits.softmax(1)
+
+    class Said(SegmentationNetwork):
+        def answers(self, *inputs: torch.Tensor) -> Answers:
+            return Answers(p, (SideAnswer(logits, 0.4), SideAnswer(logits, 0.5, enlarged=True)))
+
+    at_grid = torch.nn.functional.cross_entropy(logits, labels[:, ::2, ::2])
+    assert Objective(torch.ones(3))(Said(), [], labels).item() == pytest.approx(1.9 * at_grid.item(), rel=1e-5)
 
 
 def test_views_keep_image_and_labels_together() -> None:

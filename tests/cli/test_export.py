@@ -1,0 +1,70 @@
+"""`stsem export`, as typed."""
+
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import pytest
+
+pytest.importorskip("torch", reason="the extra 'train' is not installed")
+pytest.importorskip("onnx", reason="the extra 'train' is not installed")
+
+from stsem.classes import ClassSet
+from stsem.frame import Frame
+from stsem.inference.inferencer import Inferencer
+from stsem.inference.network import load_network
+from stsem.inference.sidecar import Difference, Sidecar, render
+from stsem.models.zoo import ZOO
+
+from .conftest import Cli
+
+pytestmark = pytest.mark.torch
+SIDECAR = Sidecar((89, 41), (0.5,) * 3, (0.25,) * 3, ClassSet(("dark", "red", "green")), Difference(4.0))
+
+
+@pytest.fixture
+def sidecar(tmp_path: Path) -> Path:
+    path = tmp_path / "like.toml"
+    path.write_text(render(SIDECAR), encoding="utf-8")
+    return path
+
+
+def test_a_network_with_uncertainty(cli: Cli, sidecar: Path, tmp_path: Path) -> None:
+    """The temporal network does not look at the image, yet takes it as every network does; the maps come along."""
+    out = tmp_path / "net.onnx"
+    arguments = ("--sidecar", sidecar, "--architecture", "pspnet-r18-temporal-w1", "--uncertainty", "3")
+    ran = cli("export", out, *arguments)
+    assert (ran.code, ran.err) == (0, "")
+    assert "3 classes, 89x41" in ran.out
+    frame = Frame(0, 0, np.random.default_rng(0).integers(0, 256, (41, 89, 3), np.uint8))
+    assert Inferencer(load_network(out), threads=1).infer(frame).labels.shape == (41, 89)
+    outputs = onnxruntime.InferenceSession(str(out), providers=["CPUExecutionProvider"]).get_outputs()
+    assert [port.name for port in outputs] == ["labels", "confidence", "variance", "entropy", "mutual_information"]
+    assert all(port.shape == [1, 41, 89] for port in outputs)
+
+
+def test_the_list(cli: Cli) -> None:
+    """Every name, and sizes that are published."""
+    ran = cli("export", "--list")
+    assert ran.code == 0
+    lines = {line.split("|")[1].strip(): line for line in ran.out.splitlines()}
+    assert ZOO.keys() <= lines.keys()
+    assert "46.7" in lines["pspnet-r50-spatial"]
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), [
+    ((), "takes OUT.onnx, --sidecar, and either"),
+    (("net.onnx", "--sidecar", "like.toml"), "takes OUT.onnx, --sidecar, and either"),
+    (("net.pt", "--sidecar", "like.toml", "--architecture", "pspnet-r18"), "must end in .onnx"),
+    (("net.onnx", "--sidecar", "none.toml", "--architecture", "pspnet-r18"), "none.toml cannot be read"),
+    (("net.onnx", "--sidecar", "like.toml", "--architecture", "pspnet"), "no architecture 'pspnet'"),
+    (("net.onnx", "--sidecar", "like.toml", "--architecture", "pspnet-r18-w1", "--uncertainty", "1"), "2 or more"),
+])  # fmt: skip
+def test_what_cannot_be_exported(
+    cli: Cli, sidecar: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], sentence: str
+) -> None:
+    """One sentence."""
+    monkeypatch.chdir(sidecar.parent)
+    ran = cli("export", *arguments)
+    assert ran.code != 0
+    assert sentence in ran.sentence
