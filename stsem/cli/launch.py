@@ -4,7 +4,8 @@ import functools
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import NoReturn, ParamSpec, cast
 
 import typer
@@ -16,7 +17,10 @@ P = ParamSpec("P")
 _Misused = cast(type[typer.BadParameter], typer.BadParameter.__mro__[1])
 """The parent of every complaint about arguments; typer gives it no public name."""
 
-_INTERRUPTED = "Interrupted; no half-written report is left behind."
+_ENDINGS = {
+    name: getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+}  # fmt: skip
+"""Signals that end a command in order: what it was writing is removed."""
 
 
 def launch(app: typer.Typer) -> NoReturn:
@@ -47,30 +51,41 @@ def verb(function: Callable[P, int | None]) -> Callable[P, None]:
 def _run(body: Callable[[], int | None]) -> int:
     if os.environ.get("STSEM_DEBUG") == "1":
         return body() or EXIT_FINE
-    interrupts: list[int] = []
+    came: list[int] = []
 
-    def interrupt(number: int, frame: object) -> NoReturn:
-        interrupts.append(number)
+    def end(number: int, frame: object) -> NoReturn:
+        came.append(number)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGINT, interrupt)
+    before = {
+        number: signal.signal(number, end)
+        for number in _ENDINGS.values()
+        if signal.getsignal(number) != signal.SIG_IGN  # nohup wants the command to go on
+    }
     try:
         return body() or EXIT_FINE
     except StsemError as err:
         return _say(str(err), err.exit_code)
     except KeyboardInterrupt:
-        return _say(_INTERRUPTED, EXIT_ERROR)
+        return _say(_ended(came), EXIT_ERROR)
     except BrokenPipeError:
         sys.stderr.close()
         return EXIT_ERROR
     except (typer.Exit, typer.Abort):
         raise
     except Exception as err:  # noqa: BLE001 - the last line of defence: a bug is told in one sentence, too
-        if interrupts:  # a library that was being loaded turned Ctrl-C into an error of its own
-            return _say(_INTERRUPTED, EXIT_ERROR)
+        if came:  # a library that was being loaded turned Ctrl-C into an error of its own
+            return _say(_ended(came), EXIT_ERROR)
         return _say(_unexpected(err), EXIT_ERROR)
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _ended(came: Sequence[int]) -> str:
+    """How, and that nothing needs to be cleaned up."""
+    by = f"Ended by {signal.Signals(came[0]).name}" if came and came[0] != signal.SIGINT else "Interrupted"
+    return f"{by}; nothing half-written is left behind."
 
 
 def _unexpected(err: Exception) -> str:
@@ -85,5 +100,6 @@ def _unexpected(err: Exception) -> str:
 
 
 def _say(text: str, code: int) -> int:
-    print(f"stsem: {plain(text, MAX_SENTENCE)}", file=sys.stderr)
+    with suppress(OSError):  # the terminal may be gone
+        print(f"stsem: {plain(text, MAX_SENTENCE)}", file=sys.stderr)
     return code

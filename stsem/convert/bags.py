@@ -1,11 +1,11 @@
 """ROS bags to MCAP: messages are copied as they are, with the definitions of their types and their log times."""
 
-import os
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from stsem.aside import aside
 from stsem.convert import rosbag1, rosbag2
 from stsem.convert.definitions import definition
 from stsem.convert.recording import Loss, Options, Progress, Summary
@@ -63,7 +63,7 @@ def convert_rosbag2(source: Path, out: Path, options: Options, progress: Progres
         ConversionError: it is none, or holds no message; MissingExtraError: the bag does not hold the definitions of
             its types and the extra `convert` is not installed; OutputError: the file cannot be written.
     """
-    scratch = out.with_name(f".{out.name}.{os.getpid()}{rosbag2.SUFFIX}")
+    scratch = aside(out, rosbag2.SUFFIX)
     with McapFile(out, profile="ros2") as log:
         copy = _Copy(log, source, options)
         files_missing, expected = rosbag2.stated(source)

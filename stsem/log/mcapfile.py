@@ -1,6 +1,5 @@
 """An MCAP file in the making: written beside its place, renamed when complete, and whole or not there at all."""
 
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import IO, Self
 
 from mcap.writer import CompressionType, Writer
 
+from stsem.aside import aside
 from stsem.errors import OutputError
 
 _CHUNK_BYTES = 2 << 20
@@ -34,7 +34,7 @@ class McapFile:
     def __init__(self, path: Path, profile: str = "") -> None:
         if path.is_dir():
             raise OutputError(f"The log {path} cannot be written: it is a folder; give the name of a file in it.")
-        self._path, self._aside = path, path.with_name(f".{path.name}.{os.getpid()}")
+        self._path, self._aside = path, aside(path)
         self.counts: dict[str, int] = {}
         self.last_ns = 0
         self._topics: dict[int, str] = {}

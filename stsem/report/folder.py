@@ -1,11 +1,11 @@
 """The folder of a run: written aside, renamed when complete."""
 
-import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from stsem.aside import aside as place_aside
 from stsem.document.canonical import to_bytes
 from stsem.document.schema import Document
 from stsem.errors import OutputError
@@ -94,7 +94,7 @@ def _holds_something_else(folder: Path) -> bool:
 def _aside(folder: Path) -> Iterator[Path]:
     """A new folder beside `folder` that takes its place at the end, or vanishes when anything goes wrong."""
     target = folder.absolute()
-    aside = target.with_name(f".{target.name}.{os.getpid()}")
+    aside = place_aside(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(aside, ignore_errors=True)

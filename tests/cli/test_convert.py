@@ -1,5 +1,8 @@
 """`stsem convert` as users call it: exit codes, what it prints, and what it never does."""
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -141,3 +144,29 @@ def test_every_format_is_named_in_help_and_docs() -> None:
     assert sorted(rows) == sorted(FORMATS)
     for name, row in FORMATS.items():
         assert row.summary in rows[name]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_conversion_that_is_ended_leaves_nothing(tmp_path: Path, number: int) -> None:
+    """Exit code 1 and a sentence that does not speak of reports."""
+    image(tmp_path / "images/0.png")
+    code = (
+        "import sys, threading\nfrom stsem.cli import main\nfrom stsem.convert import write\n"
+        "def slow(log, event):\n"
+        "    print('now', flush=True)\n"
+        "    threading.Event().wait(60)\n"
+        "write._write = slow\n"
+        "sys.argv = ['stsem', 'convert', 'images']\n"
+        "main.stsem()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "now\n"
+        assert len(list(tmp_path.glob(".images.mcap.*"))) == 1
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert err.strip().endswith("; nothing half-written is left behind.")
+    assert [path.name for path in tmp_path.iterdir()] == ["images"]

@@ -36,7 +36,7 @@ def raising(error: BaseException) -> Callable[[], int]:
         (DecodeError("/a", 5, "too short"), 1, "/a at 5 ns: too short."),
         (OutputError("Full."), 1, "Full."),
         (NothingMeasuredError("Nothing."), 5, "Nothing."),
-        (KeyboardInterrupt(), 1, "Interrupted; no half-written report is left behind."),
+        (KeyboardInterrupt(), 1, "Interrupted; nothing half-written is left behind."),
         (RuntimeError("two\nlines"), 1, "This is a defect of stsem, please report it with STSEM_DEBUG=1: "
          "RuntimeError: two lines."),
     ],
@@ -75,5 +75,5 @@ def test_an_interrupt_in_disguise(capsys: pytest.CaptureFixture[str]) -> None:
 
     before = signal.getsignal(signal.SIGINT)
     assert ended(body) == 1
-    assert capsys.readouterr().err == "stsem: Interrupted; no half-written report is left behind.\n"
+    assert capsys.readouterr().err == "stsem: Interrupted; nothing half-written is left behind.\n"
     assert signal.getsignal(signal.SIGINT) is before

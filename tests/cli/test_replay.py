@@ -114,8 +114,16 @@ def test_help_is_light() -> None:
     assert "--keyframes" in ran.stdout
 
 
-def test_interrupted(tiny_log: Path, made_up_costs: Path, tmp_path: Path) -> None:
-    """Ctrl-C in mid-replay: exit code 1, one sentence, no half-written report."""
+@pytest.mark.parametrize(
+    ("number", "how"),
+    [
+        (signal.SIGINT, "Interrupted"),
+        (signal.SIGTERM, "Ended by SIGTERM"),
+        (signal.SIGHUP, "Ended by SIGHUP"),
+    ],
+)
+def test_interrupted(tiny_log: Path, made_up_costs: Path, tmp_path: Path, number: int, how: str) -> None:
+    """Ctrl-C in mid-replay, or a job that is ended: exit code 1, one sentence, no half-written report."""
     code = (
         "import sys\nfrom stsem.cli import main\nfrom stsem.stages import segment\n"
         "honest = segment.OracleSegmenter.segment\n"
@@ -133,9 +141,9 @@ def test_interrupted(tiny_log: Path, made_up_costs: Path, tmp_path: Path) -> Non
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "now\n"
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         out, err = process.communicate(timeout=60)
     assert process.returncode == 1
     assert out == ""
-    assert err == "stsem: Interrupted; no half-written report is left behind.\n"
+    assert err == f"stsem: {how}; nothing half-written is left behind.\n"
     assert list(tmp_path.rglob("*")) == []
