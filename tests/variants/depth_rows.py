@@ -23,6 +23,7 @@ from tape import (
     calibration,
     depth,
     images,
+    millimetres,
     moving,
     static,
     together,
@@ -135,6 +136,12 @@ def rig(T_color_depth: Pose, topic: str) -> Part:
     return together(static(*links, topic=topic), moving(TF, base_transform, np.eye(4)))
 
 
+def _ahead(make: Any, scene: Scene) -> Tape:
+    """Stamps from the future; log times are those of the recorder."""
+    found = images(DEPTH, DEPTH_LATE_NS, lambda make, t, view: millimetres(make, t + 400_000_000, view))
+    return found(make, scene)
+
+
 def _late(late_ns: int) -> Part:
     """Stamps of its own, this much later than colour's."""
     draw: Draw = lambda make, t, view: make.image(t + late_ns, view.mm.astype("<u2"), "16UC1")  # noqa: E731
@@ -149,6 +156,8 @@ PROJECTED = Equal(depth_m=0.03, depth_share=0.85, map=False, warns=(DEPTH,))
 UNREGISTERED = (
     Variant("depth-stamps-apart", "depth stamps 5 ms behind those of colour: the nearest within 20 ms",
             depth=_late(5_000_000)),
+    Variant("depth-clock-ahead", "depth of a computer whose clock is 0.4 s ahead: shifted, and said", depth=_ahead,
+            equal=Equal(warns=(f"{DEPTH} and /cam/color/image_raw are on two clocks",))),
     Variant("depth-half-size", "half as many pixels each way in colour's frame: registered by the scaled calibration",
             depth=elsewhere(Scene().camera.scaled(32, 24), np.eye(4), FRAME),
             equal=replace(PROJECTED, depth_m=0.1, depth_share=0.8, warns=(f"{INFO} is for 64x48", DEPTH))),
