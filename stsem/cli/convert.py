@@ -11,6 +11,7 @@ from stsem.cli.launch import verb
 from stsem.plain import MAX_SENTENCE, plain
 
 if TYPE_CHECKING:
+    from stsem.convert.formats import Format
     from stsem.convert.recording import Summary
 
 HELP = """Convert a data set or a ROS bag to a log. The format is found by looking.
@@ -45,6 +46,7 @@ def convert(
     _check_positive(rate, "--rate")
     _check_positive(depth_scale, "--depth-scale")
     found = find_format(source, format_)
+    _check_sequence(sequence, found)
     target = out or _default_target(source)
     _check_free(source, target, force)
     with progress(f"Converting {source.name}") as step:
@@ -69,6 +71,16 @@ def _check_positive(value: float | None, flag: str) -> None:
 
     if value is not None and not (math.isfinite(value) and value > 0):
         raise UsageError(f"{flag} is {value:g}, but it must be above 0.")
+
+
+def _check_sequence(sequence: str | None, found: "Format") -> None:
+    from stsem.errors import UsageError
+
+    if sequence is not None and not found.several:
+        raise UsageError(
+            f"--sequence is {sequence!r}, but a source of this format ({found.summary}) holds one recording; "
+            "leave it out."
+        )
 
 
 def _check_free(source: Path, target: Path, force: bool) -> None:

@@ -40,6 +40,7 @@ def inspect(
     """Read the log once, and a sample of its frames."""
     from stsem.cli.console import progress
     from stsem.cli.foreign import pointing_to_convert
+    from stsem.cli.recordings import check_once
     from stsem.cli.tables import inspection_text, terminal_width
     from stsem.document.canonical import canonical
     from stsem.errors import EXIT_FINE, EXIT_LOSSY, ClassTableError, LogError
@@ -48,6 +49,7 @@ def inspect(
     from stsem.log.log import scan_log
     from stsem.replay.settings import parse_topics
 
+    check_once(log)
     topics = parse_topics(topic or [])
     with progress(f"Reading {log_name(log)}") as step, pointing_to_convert(log):
         scanned = scan_log(log, step)

@@ -18,10 +18,19 @@ def recordings(given: Sequence[str]) -> list[tuple[str, ...]]:
     Raises:
         UsageError: one was given twice.
     """
-    if twice := [one for one in given if given.count(one) > 1]:
-        raise UsageError(f"{without_secrets(twice[0])} was given twice; give each log once.")
+    check_once(given)
     groups: dict[tuple[str, ...], list[str]] = {}
     for one in given:
         part = _PART.fullmatch(without_secrets(one) if is_url(one) else one)
         groups.setdefault(part.groups() if part else (one,), []).append(one)
     return [tuple(group) for group in groups.values()]
+
+
+def check_once(given: Sequence[str]) -> None:
+    """Nothing may be given twice.
+
+    Raises:
+        UsageError: one was.
+    """
+    if twice := [one for one in given if given.count(one) > 1]:
+        raise UsageError(f"{without_secrets(twice[0])} was given twice; give each log once.")

@@ -23,6 +23,7 @@ class Format:
         convert: writes it as a log. Of a data set, `dataset(read)`, where `read(source, options)` opens it as a
             `Recording` and raises ConversionError with one sentence when it cannot.
         last: whether it is looked at only when nothing else fits.
+        several: whether a source may hold several recordings, so that one is chosen by name.
     """
 
     summary: str
@@ -30,6 +31,7 @@ class Format:
     detect: Callable[[Path], bool]
     convert: Convert
     last: bool = False
+    several: bool = False
 
 
 FORMATS: dict[str, Format] = {
@@ -53,17 +55,28 @@ FORMATS: dict[str, Format] = {
         dataset(nice_slam.read),
     ),
     "scannet": Format(
-        "ScanNet scan", "scene.sens, and label-filt/ with its table of classes", scannet.detect, dataset(scannet.read)
+        "ScanNet scan",
+        "scene.sens, and label-filt/ with its table of classes",
+        scannet.detect,
+        dataset(scannet.read),
+        several=True,
     ),
-    "camvid": Format("CamVid", "train/ and trainannot/, or 701_StillsRaw_full/", camvid.detect, dataset(camvid.read)),
+    "camvid": Format(
+        "CamVid", "train/ and trainannot/, or 701_StillsRaw_full/", camvid.detect, dataset(camvid.read), several=True
+    ),
     "cityscapes": Format(
         "Cityscapes sequences",
         "leftImg8bit_sequence/, gtFine/, camera/, disparity/",
         cityscapes.detect,
         dataset(cityscapes.read),
+        several=True,
     ),
     "kitti-step": Format(
-        "KITTI-STEP", "image_02/ and panoptic_maps/, calib/, poses/", kitti_step.detect, dataset(kitti_step.read)
+        "KITTI-STEP",
+        "image_02/ and panoptic_maps/, calib/, poses/",
+        kitti_step.detect,
+        dataset(kitti_step.read),
+        several=True,
     ),
     "images": Format(
         "a folder of images",

@@ -96,14 +96,14 @@ def read_bytes(path: Path, root: Path, limit: int = MAX_FILE_BYTES) -> bytes:
     return data
 
 
-def read_text(path: Path, root: Path) -> str:
-    """A text file that a data set cannot be read without.
+def read_text(path: Path, root: Path, errors: str = "strict") -> str:
+    """A text file that a data set cannot be read without; `errors` says what becomes of bytes that are no UTF-8.
 
     Raises:
         ConversionError: it cannot be read, or is no text.
     """
     try:
-        return read_bytes(path, root, MAX_TEXT_BYTES).decode("utf-8-sig")
+        return read_bytes(path, root, MAX_TEXT_BYTES).decode("utf-8-sig", errors)
     except ValueError as err:
         raise ConversionError(f"{path} cannot be read as text: {err}; mend or remove the file.") from err
 

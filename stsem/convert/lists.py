@@ -17,10 +17,12 @@ _MAX_SECONDS = 2**32
 def rows(path: Path, root: Path) -> list[list[str]]:
     """The lines of a file, split at blanks and commas; without empty lines and comments (#).
 
+    Bytes that are no UTF-8 become U+FFFD: harmless in a comment, and elsewhere that line alone cannot be read.
+
     Raises:
-        ConversionError: it cannot be read, or is no text.
+        ConversionError: it cannot be read.
     """
-    split = (line.split("#")[0].replace(",", " ").split() for line in read_text(path, root).splitlines())
+    split = (line.split("#")[0].replace(",", " ").split() for line in read_text(path, root, "replace").splitlines())
     return [words for words in split if words]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from stsem.classes import NO_LABEL, ClassSet, Labels, translation
 from stsem.errors import ClassTableError
+from stsem.inference.backends import choose_backend
 from stsem.inference.cache import CachedInferencer, OutputCache, cache_root
 from stsem.inference.network import Network, load_network
 from stsem.log.log import Log
@@ -52,13 +53,16 @@ def build_model(log: Log, config: RunConfig) -> Model:
     """The network or the oracle, and how its classes meet those of the log.
 
     Raises:
+        UsageError: there is no such backend or precision; it is said of the oracle, too, which needs none.
         NetworkError: the network cannot be used.
-        ClassTableError: the oracle without truth, or a class map that names unknown classes.
+        ClassTableError: the oracle without truth, or a class map that cannot be read or names unknown classes.
     """
+    choose_backend(config.backend, config.precision)
+    class_map = _class_map(config.class_map)
     if config.is_oracle:
         return _oracle(log)
     network = load_network(config.model)
-    classes, table, reason = _meeting(network.classes, log, config)
+    classes, table, reason = _meeting(network.classes, log, class_map)
     make = partial(_network_segmenter, network, table, log, config)
     return Model(Path(config.model).name, network, classes, table, reason, make)
 
@@ -105,7 +109,7 @@ def _oracle(log: Log) -> Model:
     return Model("oracle", None, log.classes, None, "", lambda threads, times: Memo(segmenter))
 
 
-def _meeting(network: ClassSet, log: Log, config: RunConfig) -> tuple[ClassSet, Labels, str]:
+def _meeting(network: ClassSet, log: Log, class_map: dict[str, str]) -> tuple[ClassSet, Labels, str]:
     """(classes of the run, translation into them, why accuracy cannot be measured)."""
     own: Labels = np.arange(256, dtype=np.uint8)
     if log.info.choice.labels is None:
@@ -114,7 +118,7 @@ def _meeting(network: ClassSet, log: Log, config: RunConfig) -> tuple[ClassSet, 
         return network, own, "the labels of the log have no class table; give one with --classes"
     if not _has_truth(log):
         return network, own, "no frame in the window has truth"
-    table = translation(network, log.classes, _class_map(config.class_map))
+    table = translation(network, log.classes, class_map)
     if (table[: len(network)] == NO_LABEL).all():
         return network, own, (
             f"the network ({', '.join(network.names)}) and the log ({', '.join(log.classes.names)}) have no class in "

@@ -12,9 +12,14 @@ from stsem.replay.queues import parse_queue
 from stsem.stages.propagate import PROPAGATIONS
 from stsem.stages.select import parse_policy
 
+_SWITCHES = {"on": True, "yes": True, "true": True, "1": True, "off": False, "no": False, "false": False, "0": False}
 
-def _on_off(value: object) -> object:
-    return {"on": True, "yes": True, "off": False, "no": False}.get(value, value) if isinstance(value, str) else value
+
+def _on_off(value: object) -> bool:
+    try:
+        return _SWITCHES[str(value).lower()]
+    except KeyError:
+        raise ValueError("it can be on or off") from None
 
 
 def _number_as_text(value: object) -> object:

@@ -170,3 +170,12 @@ def test_a_conversion_that_is_ended_leaves_nothing(tmp_path: Path, number: int) 
     assert process.returncode == 1
     assert err.strip().endswith("; nothing half-written is left behind.")
     assert [path.name for path in tmp_path.iterdir()] == ["images"]
+
+
+@pytest.mark.parametrize("name", [name for name, row in FORMATS.items() if not row.several])
+def test_a_sequence_of_what_is_one(cli: Cli, walk: Path, home: Path, name: str) -> None:
+    """Nobody chose anything, so nothing is converted."""
+    ran = cli("convert", walk, "--from", name, "--sequence", "q")
+    assert ran.code == 2
+    assert "--sequence is 'q'" in ran.sentence
+    assert not (home / "walk.mcap").exists()

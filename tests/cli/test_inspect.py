@@ -196,3 +196,10 @@ def test_a_damaged_log_is_inspected_as_far_as_it_goes(cli: Cli, home: Path) -> N
 def test_the_replay_says_so_too(cli: Cli, home: Path) -> None:
     (home / "drive.bag").write_bytes(b"#ROSBAG V2.0\n" + bytes(100))
     assert cli("replay", "drive.bag").sentence.endswith("stsem convert drive.bag")
+
+
+def test_a_log_given_twice(cli: Cli, tiny_log: Path) -> None:
+    """As in a replay: the command that is shown at the end could not be."""
+    ran = cli("inspect", tiny_log, tiny_log)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.sentence == f"{tiny_log} was given twice; give each log once."

@@ -139,3 +139,18 @@ def test_a_list_without_images_is_a_sentence(tmp_path: Path, content: str | byte
     write(tmp_path / "rgb.txt", content)
     with pytest.raises(ConversionError, match=r"^.*rgb\.txt .*\.$"):
         tum.read(tmp_path, Options())
+
+
+def test_bytes_that_are_no_text_cost_their_line(freiburg: Path, tmp_path: Path) -> None:
+    """A comment in Latin-1 costs nothing, a number with a broken byte costs a pose, a broken name an image."""
+    poses = (freiburg / "groundtruth.txt").read_bytes().splitlines(keepends=True)
+    poses[0] = "# aufgenommen in Köln\n".encode("latin-1")
+    poses[2] = poses[2].replace(b".", b"\xff", 1)
+    (freiburg / "groundtruth.txt").write_bytes(b"".join(poses))
+    images = (freiburg / "rgb.txt").read_bytes()
+    (freiburg / "rgb.txt").write_bytes(images.replace(b"rgb/2", b"rgb/\xe9"))
+    converted = convert(tum.read, freiburg, tmp_path / "log.mcap")
+    assert converted.summary.losses["lines of groundtruth.txt that are not a stamp and a pose"] == 1
+    assert sum(converted.summary.losses.values()) == 2
+    assert converted.summary.messages["/camera/color"] == 3
+    assert converted.summary.messages["/pose"] == 3
