@@ -4,6 +4,7 @@ Simonyan and Zisserman, Very Deep Convolutional Networks for Large-Scale Image R
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from torch import nn
 
@@ -43,7 +44,7 @@ def channels(width: float = 1.0) -> tuple[int, ...]:
 def convolutions(chain: Sequence[int], *, batch_norm: bool = False, dilation: int = 1) -> nn.Sequential:
     """3x3 convolutions with ReLU from chain[0] channels to chain[1], and so on; the grid keeps its size."""
     layers: list[nn.Module] = []
-    for cin, cout in zip(chain, chain[1:], strict=False):
+    for cin, cout in pairwise(chain):
         layers += conv_bn(cin, cout, 3, 1, dilation) if batch_norm else [convolution(cin, cout, 3, dilation)]
         layers.append(nn.ReLU(inplace=True))
     return nn.Sequential(*layers)

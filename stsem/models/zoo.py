@@ -10,8 +10,12 @@ from dataclasses import dataclass
 from functools import partial
 
 from stsem.errors import UsageError
+from stsem.models.bayesian_segnet import BayesianSegNet
+from stsem.models.fcn import FCN
 from stsem.models.network import SegmentationNetwork
+from stsem.models.parsenet import ParseNet
 from stsem.models.resnet import ResNetSpec
+from stsem.models.segnet import SegNet, SegNetBasic
 from stsem.models.two_stream import FeatureFusion, OneStream, PredictionFusion, prediction_max, prediction_sum
 
 SIXTEENTHS = 16
@@ -42,6 +46,13 @@ class Row:
 
 
 _PSPNET = Paper("Zhao et al. 2016", "Pyramid Scene Parsing Network", "figure 3")
+_FCN = Paper("Long et al. 2015", "Fully Convolutional Networks for Semantic Segmentation", "figure 3")
+_PARSENET = Paper("Liu et al. 2015", "ParseNet: Looking Wider to See Better", "figure 1e")
+_BAYESIAN = Paper("Kendall et al. 2015", "Bayesian SegNet", "figure 2")
+
+
+def _segnet(where: str) -> Paper:
+    return Paper("Badrinarayanan et al. 2015", "SegNet: A Deep Convolutional Encoder-Decoder Architecture", where)
 
 
 def _paper(how: str) -> Paper:
@@ -79,6 +90,11 @@ def _pspnets(depth: int) -> dict[str, Row]:
 
 ZOO: dict[str, Row] = {
     **_pspnets(18), **_pspnets(50), **_pspnets(101),
+    **{f"fcn-{stride}s": Row(_FCN, partial(FCN, stride=stride)) for stride in (32, 16, 8)},
+    "parsenet": Row(_PARSENET, ParseNet),
+    "segnet": Row(_segnet("figure 2"), SegNet),
+    "segnet-basic": Row(_segnet("section 3.1"), SegNetBasic),
+    "bayesian-segnet": Row(_BAYESIAN, BayesianSegNet),
 }  # fmt: skip
 ALIASES = {f"pspnet-r{depth}": f"pspnet-r{depth}-sum" for depth in (18, 50, 101)}
 """The paper's best fusion needs no name."""
