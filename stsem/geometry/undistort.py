@@ -108,12 +108,10 @@ class Undistortion:
 
 def _maps(camera: Camera) -> Maps:
     """Where each pixel of the pinhole image is in the real one; outside the image where the lens does not tell."""
-    lens, d = LENSES.get(camera.model), np.array(camera.distortion, np.float64)
+    lens = LENSES.get(camera.model)
     if lens is None:
         raise ValueError(f"the distortion model {camera.model!r} is not known, only {', '.join(LENSES)}")
-    if len(d) not in lens.counts:
-        wanted = " or ".join(str(count) for count in lens.counts)
-        raise ValueError(f"{camera.model} has {wanted} coefficients, but {len(d)} came")
+    d = _coefficients(camera, lens)
     if not 0 < max(camera.width, camera.height) <= MAX_SIDE:
         raise ValueError(f"an image of {camera.width}x{camera.height} pixels cannot be resampled")
     with np.errstate(all="ignore"):
@@ -128,6 +126,16 @@ def _maps(camera: Camera) -> Maps:
         values[~told] = -2
         np.clip(values, -2, far, out=values)
     return x, y
+
+
+def _coefficients(camera: Camera, lens: Lens) -> Float64:
+    """As many as the model may have; drivers fill messages up with zeros, which mean nothing."""
+    d = np.array(camera.distortion, np.float64)
+    for count in sorted(lens.counts, reverse=True):
+        if count <= len(d) and not d[count:].any():
+            return d[:count]
+    wanted = " or ".join(str(count) for count in lens.counts)
+    raise ValueError(f"{camera.model} has {wanted} coefficients, but {len(d)} came")
 
 
 def _reach(end: float, lens: Lens, d: Float64) -> float:

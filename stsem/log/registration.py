@@ -178,7 +178,8 @@ def _through(depth: View, color: View, T_color_depth: Pose) -> tuple[DepthReader
     metres = float(np.linalg.norm(T_color_depth[:3, 3]))
     sentence = f"{depth} is registered to {color} by calibrations and transforms ({metres:.3f} m apart)."
     steps = (*steps, DepthRegistration(source, target, T_color_depth))
-    return DepthReader(depth.size, steps), [*depth.optics.warnings, Remark("depth-registered", sentence)]
+    said = [warning for warning in depth.optics.warnings if warning not in color.optics.warnings]
+    return DepthReader(depth.size, steps), [*said, Remark("depth-registered", sentence)]
 
 
 def _is_identity(T: Pose) -> bool:

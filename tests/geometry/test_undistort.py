@@ -78,6 +78,24 @@ def test_coefficients_of_no_lens_are_refused(model: str, d: tuple[float, ...], r
         Undistortion(lens(model, d))
 
 
+@pytest.mark.parametrize(
+    ("model", "d", "filled_up"),
+    [
+        ("equidistant", (0.1, -0.02, 0.0, 0.0), (0.1, -0.02, 0.0, 0.0, 0.0)),
+        ("plumb_bob", (-0.2, 0.05, 0.0, 0.0, 0.01), (-0.2, 0.05, 0.0, 0.0, 0.01, 0.0, 0.0)),
+        ("plumb_bob", (-0.2, 0.05, 0.0, 0.0), (-0.2, 0.05, 0.0, 0.0) + (0.0,) * 20),
+    ],
+)
+def test_zeros_behind_the_coefficients_mean_nothing(
+    model: str, d: tuple[float, ...], filled_up: tuple[float, ...]
+) -> None:
+    """Drivers fill messages up."""
+    image = np.random.default_rng(0).integers(0, 256, (lens(model, d).height, lens(model, d).width, 3), np.uint8)
+    plain = Undistortion(lens(model, d)).image(image)
+    assert not np.array_equal(plain, image)
+    np.testing.assert_array_equal(Undistortion(lens(model, filled_up)).image(image), plain)
+
+
 def test_a_size_beyond_16_bits_is_refused() -> None:
     with pytest.raises(ValueError, match="40000x2 pixels cannot be resampled"):
         Undistortion(replace(lens(*LENSES[0]), width=40_000, height=2))

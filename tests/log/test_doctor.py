@@ -1,7 +1,9 @@
 """The doctor: every finding is provoked by one change to a healthy robot, and nothing else is found."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -206,13 +208,35 @@ def test_findings_about_bytes(tmp_path: Path) -> None:
     (folder / "run_1.mcap.active").write_bytes(b"\x89MCAP0\r\n")
     assert names(folder) == {"file-unfinished"}
     short = replace(HEALTHY, depth_size=(64, 48))
-    assert names(short.record(tmp_path / "c.mcap")) == {"depth-undecodable", "damage"}
+    assert names(short.record(tmp_path / "c.mcap")) == {"depth-undecodable", "undecodable"}
 
     def garbage(log: Recorder) -> None:
         log.ros("/p", "geometry_msgs/msg/PoseStamped", b"\0\1\0\0", BASE_NS)
 
     path = replace(HEALTHY, poses=garbage, static=nothing).record(tmp_path / "d.mcap")
-    assert names(path, topics={"pose": "/p"}) == {"pose-unreadable", "damage"}
+    assert names(path, topics={"pose": "/p"}) == {"pose-unreadable", "undecodable"}
+
+
+@pytest.mark.parametrize("wrong", [{"k": (math.nan,) * 9}, {"d": (math.nan,) * 5}], ids=["K", "D"])
+def test_a_calibration_that_is_not_finite_is_no_damage_of_the_file(tmp_path: Path, wrong: dict[str, Any]) -> None:
+    """What is to be done about it is not to copy the log."""
+    found = inspected(replace(HEALTHY, info=lambda stamp: info(stamp, **wrong)).record(tmp_path / "log.mcap"))
+    assert [finding.name for finding in found.findings] == ["intrinsics-implausible", "map-impossible"]
+    assert "cannot be used; the first: " in found.findings[0].what
+    assert found.damage["lossy"]
+
+
+def test_a_calibration_that_changes_is_said_once(tmp_path: Path) -> None:
+    """Though depth, of twice the size, is registered by the same one."""
+
+    def larger(stamp_ns: int) -> bytes:
+        f = 120.0 if stamp_ns < stamp_of(2) else 130.0
+        return info(stamp_ns, width=2 * WIDTH, height=2 * HEIGHT, k=(f, 0, 70.0, 0, f, 40.0, 0, 0, 1))
+
+    robot = replace(HEALTHY, info=larger, depth=lambda i: depth_picture(i).repeat(2, 0).repeat(2, 1))
+    found = inspected(robot.record(tmp_path / "log.mcap"))
+    assert [finding.name for finding in found.findings].count("intrinsics-change") == 1
+    assert any("is registered to" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(("frame", "found"), [("camera_link", True), ("camera_optical_frame", False)])
@@ -226,7 +250,7 @@ def test_images_in_a_frame_of_body_axes(tmp_path: Path, frame: str, found: bool)
 
 
 def test_every_check_is_tested() -> None:
-    elsewhere = {"unprotected", "damage", "file-unfinished", "depth-undecodable", "pose-unreadable"}
+    elsewhere = {"unprotected", "damage", "undecodable", "file-unfinished", "depth-undecodable", "pose-unreadable"}
     assert {check.name for check in CHECKS if check.do} == BROKEN.keys() | elsewhere
     assert len({check.name for check in CHECKS}) == len(CHECKS)
 

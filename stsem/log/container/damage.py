@@ -23,7 +23,7 @@ what stands behind the closing magic of the first is `unread_byte`; give them as
 
 import threading
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 from stsem.plain import plain
@@ -33,6 +33,11 @@ KINDS = (
     "missing_file", "truncated", "bad_record", "chunk_crc", "chunk_unreadable", "lost_message", "unknown_channel",
     "undecodable", "data_crc", "summary_crc", "attachment_crc", "contradiction", "unread_byte",
 )  # fmt: skip
+
+
+UNDECODABLE = "undecodable"
+OF_BYTES = tuple(kind for kind in KINDS if kind != UNDECODABLE)
+"""What is wrong with the file; a message that cannot be decoded may well be as it was recorded."""
 
 
 class Damage:
@@ -100,11 +105,13 @@ class Damage:
 
     def __str__(self) -> str:
         reasons = "".join(f"; the first of {channel}: {reason}" for channel, reason in self.reasons.items())
-        return self._summary() + reasons
+        return self.summary(KINDS) + reasons
 
-    def _summary(self) -> str:
+    def summary(self, kinds: Collection[str]) -> str:
+        """The counts of these kinds with their channels, for people; "none" when there is no case."""
         parts = (
             f"{kind} {sum(channels.values())}" + (f" ({', '.join(filter(None, channels))})" if any(channels) else "")
             for kind, channels in self.counts.items()
+            if kind in kinds
         )
         return ", ".join(parts) or "none"

@@ -12,6 +12,13 @@ CHECKS = (
         parts.damage,
     ),
     Check(
+        "undecodable",
+        "messages are there, but cannot be used: their encoding, their size, their class table",
+        "Mend what the reason names where it is recorded, or cut the log where it begins; if these are a few among "
+        "many, copy the log again. Results are marked lossy and the exit code is 3.",
+        parts.undecodable,
+    ),
+    Check(
         "unprotected",
         "messages stand under no checksum",
         "Record with chunk checksums (rosbag2: not with the preset fastwrite), or rewrite the log with `mcap recover`.",
@@ -56,7 +63,8 @@ CHECKS = (
     ),
     Check(
         "intrinsics-implausible",
-        "the field of view, the shape of the pixels or the principal point are those of no camera",
+        "numbers are not finite, or the field of view, the shape of the pixels or the principal point are those of no "
+        "camera",
         "Check that the calibration is in pixels, of this camera, and of this image size.",
         pictures.intrinsics_implausible,
     ),
@@ -78,7 +86,7 @@ CHECKS = (
     Check(
         "depth-unit",
         "half of the depth is nearer than 0.1 m or farther than 100 m",
-        "Let the driver send 16 bits of millimetres or floats of metres, or convert with --depth-scale.",
+        "Let the driver send 16 bits of millimetres or floats of metres, and record again: no flag mends it in a log.",
         pictures.depth_unit,
     ),
     Check(

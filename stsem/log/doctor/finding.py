@@ -45,6 +45,12 @@ class Examined:
     truth: TruthSummary | None
     pose: PoseSummary | None
 
+    @property
+    def calibration_topics(self) -> frozenset[str]:
+        """Topics whose messages are calibrations."""
+        words = ("CameraInfo", "CameraCalibration")
+        return frozenset(channel.topic for channel in self.info.channels if channel.schema.endswith(words))
+
     def said(self, *names: str) -> tuple[str, ...]:
         """The sentences of these names that were said while the log was opened."""
         return tuple(str(text) for text in self.info.warnings if isinstance(text, Remark) and text.name in names)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from stsem.log.container.damage import OF_BYTES, UNDECODABLE
 from stsem.log.doctor.finding import Examined
 from stsem.log.poses.body import has_body_axes
 
@@ -95,9 +96,17 @@ def unprotected(seen: Examined) -> Iterator[str]:
 
 
 def damage(seen: Examined) -> Iterator[str]:
-    """Anything broken."""
-    if seen.info.damage.lossy:
-        yield f"The log is damaged: {seen.info.damage}."
+    """Bytes that are broken."""
+    if seen.info.damage.counts.keys() & set(OF_BYTES):
+        yield f"The log is damaged: {seen.info.damage.summary(OF_BYTES)}."
+
+
+def undecodable(seen: Examined) -> Iterator[str]:
+    """Messages that are there and cannot be used, but for calibrations, which have a finding of their own."""
+    counts, calibrations = seen.info.damage.counts.get(UNDECODABLE, {}), seen.calibration_topics
+    for topic, reason in seen.info.damage.reasons.items():
+        if topic not in calibrations:
+            yield f"{counts[topic]} messages of {topic} cannot be used; the first: {reason}."
 
 
 def _on_another_clock(seen: Examined, topic: str | None) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from stsem.log.container.damage import UNDECODABLE
 from stsem.log.doctor.finding import Examined
 from stsem.log.doctor.seen import DEPTH_BINS
 
@@ -38,6 +39,10 @@ def video_codec(seen: Examined) -> Iterator[str]:
 
 def intrinsics_implausible(seen: Examined) -> Iterator[str]:
     """Intrinsics that no camera has."""
+    counts = seen.info.damage.counts.get(UNDECODABLE, {})
+    for topic, reason in seen.info.damage.reasons.items():
+        if topic in seen.calibration_topics:
+            yield f"{counts[topic]} calibrations of {topic} cannot be used; the first: {reason}."
     camera = seen.camera
     if camera is None:
         return
