@@ -11,7 +11,6 @@ from torch.nn import functional
 
 from stsem.models import vgg
 from stsem.models.network import SegmentationNetwork, scaled, softmax
-from stsem.models.resnet import conv_bn
 
 
 class SegNet(SegmentationNetwork):
@@ -97,8 +96,8 @@ class SegNetBasic(SegmentationNetwork):
         super().__init__()
         c = scaled(64, width)
         self.normalise = nn.LocalResponseNorm(5)
-        self.encoders = nn.ModuleList(nn.Sequential(*conv_bn(cin, c, 7), nn.ReLU(inplace=True)) for cin in (3, c, c, c))
-        self.decoders = nn.ModuleList(nn.Sequential(*conv_bn(c, c, 7)) for _ in self.encoders)
+        self.encoders = nn.ModuleList(nn.Sequential(*_conv_bn(cin, c), nn.ReLU(inplace=True)) for cin in (3, c, c, c))
+        self.decoders = nn.ModuleList(nn.Sequential(*_conv_bn(c, c)) for _ in self.encoders)
         self.classifier = nn.Conv2d(c, classes, 1)
 
     def features(self, *inputs: Tensor) -> tuple[Tensor, ...]:
@@ -110,3 +109,7 @@ class SegNetBasic(SegmentationNetwork):
     def head(self, *features: Tensor) -> Tensor:
         """Probabilities (B, C, H, W)."""
         return softmax(self.classifier(*features))
+
+
+def _conv_bn(cin: int, cout: int) -> list[nn.Module]:
+    return [vgg.convolution(cin, cout, 7, bias=False), nn.BatchNorm2d(cout)]

@@ -9,7 +9,6 @@ from itertools import pairwise
 from torch import nn
 
 from stsem.models.network import scaled
-from stsem.models.resnet import conv_bn
 
 BLOCKS = ((64, 2), (128, 2), (256, 3), (512, 3), (512, 3))
 """Channels and number of the 3x3 convolutions of each block."""
@@ -45,19 +44,19 @@ def convolutions(chain: Sequence[int], *, batch_norm: bool = False, dilation: in
     """3x3 convolutions with ReLU from chain[0] channels to chain[1], and so on; the grid keeps its size."""
     layers: list[nn.Module] = []
     for cin, cout in pairwise(chain):
-        layers += conv_bn(cin, cout, 3, 1, dilation) if batch_norm else [convolution(cin, cout, 3, dilation)]
-        layers.append(nn.ReLU(inplace=True))
+        layers.append(convolution(cin, cout, 3, dilation, bias=not batch_norm))
+        layers += [nn.BatchNorm2d(cout), nn.ReLU(inplace=True)] if batch_norm else [nn.ReLU(inplace=True)]
     return nn.Sequential(*layers)
 
 
-def convolution(cin: int, cout: int, kernel: int, dilation: int = 1) -> nn.Conv2d:
-    """A convolution that keeps the grid's size, with bias, to be followed by a ReLU.
+def convolution(cin: int, cout: int, kernel: int, dilation: int = 1, *, bias: bool = True) -> nn.Conv2d:
+    """A convolution that keeps the grid's size, to be followed by a ReLU.
 
-    Drawn as in He et al., Delving Deep into Rectifiers (2015), equation 10: without normalisation torch's own draw
-    fades to nothing over thirteen layers.
+    Drawn as in He et al., Delving Deep into Rectifiers (2015), equation 10, as in SegNet's
+    Caffe models: torch's own draw fades to nothing over thirteen layers.
     """
-    layer = nn.Conv2d(cin, cout, kernel, padding=dilation * (kernel // 2), dilation=dilation)
+    layer = nn.Conv2d(cin, cout, kernel, padding=dilation * (kernel // 2), dilation=dilation, bias=bias)
     nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
-    assert layer.bias is not None
-    nn.init.zeros_(layer.bias)
+    if layer.bias is not None:
+        nn.init.zeros_(layer.bias)
     return layer
