@@ -61,12 +61,16 @@ class FCN(SegmentationNetwork):
 
     def head(self, *features: Tensor) -> Tensor:
         """Probabilities (B, C, H, W)."""
+        return softmax(self.scores(*features))
+
+    def scores(self, *features: Tensor) -> Tensor:
+        """The logits of `head`."""
         fc6, *skips, canvas = features
         x = self.score(self.fc7(fc6))
         for enlarge, skip in zip(self.upscores, skips, strict=True):
             x = _cropped(enlarge(x), skip) + skip
         size = [side * self.stride for side in x.shape[-2:]]
-        return softmax(_cropped(functional.interpolate(x, size=size, mode="bilinear", align_corners=False), canvas))
+        return _cropped(functional.interpolate(x, size=size, mode="bilinear", align_corners=False), canvas)
 
 
 def bilinear(channels: int, factor: int) -> nn.ConvTranspose2d:

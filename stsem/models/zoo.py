@@ -10,8 +10,12 @@ from dataclasses import dataclass
 from functools import partial
 
 from stsem.errors import UsageError
+from stsem.models.adapnet import AdapNet
 from stsem.models.bayesian_segnet import BayesianSegNet
+from stsem.models.crf_rnn import CRFRNN
+from stsem.models.deeplab import DeepLab
 from stsem.models.fcn import FCN
+from stsem.models.fusenet import FuseNet
 from stsem.models.network import SegmentationNetwork
 from stsem.models.parsenet import ParseNet
 from stsem.models.resnet import ResNetSpec
@@ -49,10 +53,17 @@ _PSPNET = Paper("Zhao et al. 2016", "Pyramid Scene Parsing Network", "figure 3")
 _FCN = Paper("Long et al. 2015", "Fully Convolutional Networks for Semantic Segmentation", "figure 3")
 _PARSENET = Paper("Liu et al. 2015", "ParseNet: Looking Wider to See Better", "figure 1e")
 _BAYESIAN = Paper("Kendall et al. 2015", "Bayesian SegNet", "figure 2")
+_DEEPLAB = Paper("Chen et al. 2016", "DeepLab: Semantic Image Segmentation with Deep Convolutional Nets", "figure 7")
+_CRF_RNN = Paper("Zheng et al. 2015", "Conditional Random Fields as Recurrent Neural Networks", "algorithm 1")
+_FUSENET = Paper("Hazirbas et al. 2016", "FuseNet: Incorporating Depth into Semantic Segmentation", "figure 2")
 
 
 def _segnet(where: str) -> Paper:
     return Paper("Badrinarayanan et al. 2015", "SegNet: A Deep Convolutional Encoder-Decoder Architecture", where)
+
+
+def _adapnet(where: str) -> Paper:
+    return Paper("Valada et al. 2019", "Self-Supervised Model Adaptation for Multimodal Semantic Segmentation", where)
 
 
 def _paper(how: str) -> Paper:
@@ -95,6 +106,12 @@ ZOO: dict[str, Row] = {
     "segnet": Row(_segnet("figure 2"), SegNet),
     "segnet-basic": Row(_segnet("section 3.1"), SegNetBasic),
     "bayesian-segnet": Row(_BAYESIAN, BayesianSegNet),
+    "deeplab-v2": Row(_DEEPLAB, DeepLab),
+    "deeplab-v2-crf": Row(_DEEPLAB, partial(DeepLab, crf=True)),
+    "crf-rnn": Row(_CRF_RNN, CRFRNN),
+    "fusenet": Row(_FUSENET, FuseNet),
+    "adapnet-pp": Row(_adapnet("figure 2"), AdapNet),
+    "adapnet-pp-ssma": Row(_adapnet("figures 2 and 5"), partial(AdapNet, inputs=("image", "depth"))),
 }  # fmt: skip
 ALIASES = {f"pspnet-r{depth}": f"pspnet-r{depth}-sum" for depth in (18, 50, 101)}
 """The paper's best fusion needs no name."""
