@@ -79,7 +79,7 @@ def _state(context: Context, measured: bool) -> tuple[State, tuple[str, ...]]:
     if not measured and not timed:
         return "invalid", ("Neither accuracy nor timing could be measured.",)
     damage = context.log.info.damage
-    return ("lossy", (f"The log is damaged: {damage}.",)) if damage.lossy else ("valid", ())
+    return ("lossy", (f"Parts of the log are missing or cannot be used: {damage}.",)) if damage.lossy else ("valid", ())
 
 
 def _verdict(context: Context, state: str, scored: int, reason: str) -> Verdict:

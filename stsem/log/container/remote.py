@@ -169,7 +169,7 @@ def _system(url: str, shown: str) -> tuple[Any, str]:
     protocol = url.split("::")[0].partition("://")[0].lower()
     extra = _EXTRAS.get(protocol, "remote")
     try:
-        import fsspec  # type: ignore[import-untyped]
+        import fsspec
 
         system, path = fsspec.core.url_to_fs(url, **_options(protocol, url))
     except ImportError as err:
