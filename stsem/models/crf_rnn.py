@@ -3,7 +3,8 @@
 Zheng et al., Conditional Random Fields as Recurrent Neural Networks (2015), algorithm 1 and figures 1 and 2. The paper
 joins every pixel with every other one at the image's size. Here the field is a quarter as wide and high, and a pixel
 hears of those in the 11 x 11 window around it (20 pixels of the image either way), both as in Teichmann and Cipolla,
-Convolutional CRFs for Semantic Segmentation (2018), sections 4.1 and 5: within the window the sums are exact.
+Convolutional CRFs for Semantic Segmentation (2018): within the window the sums are exact. Ten iterations for 13 classes
+at 473 x 473 are 0.45 G multiply-adds, of tensors and not of convolutions, so `stsem.models.cost` does not count them.
 """
 
 from collections.abc import Sequence

@@ -23,8 +23,10 @@ DEEPER = {f"pspnet-r{depth}-{name}" for depth in (50, 101)
           for name in ("temporal", "sum", "max", "feature-sum", "feature-concat")}  # fmt: skip
 """The streams of `spatial`, joined as on ResNet-18: nothing new, and slow to export. They are built and counted."""
 TRIED = [name for name in ZOO if name not in DEEPER]
-EXPORTED = [name for name in TRIED if name not in {"pspnet-r101-spatial", "pspnet-r18-temporal"}]
-"""The former has more of the same blocks; tests/cli/test_export.py exports the latter."""
+ELSEWHERE = {"pspnet-r18-temporal", "deeplab-v2", "deeplab-v2-crf"}
+"""Exported in tests/cli/test_export.py and, on ResNet-18, in tests/models/test_deeplab.py."""
+EXPORTED = [name for name in TRIED if name not in {"pspnet-r101-spatial", "adapnet-pp", *ELSEWHERE}]
+"""PSPNet has more of the same blocks there; SSMA contains AdapNet++."""
 
 
 def _network(name: str) -> SegmentationNetwork:
