@@ -39,7 +39,7 @@ def test_the_header_names_frame_unit_and_classes() -> None:
         "comment frame: world, metres",
         "comment class 0 wall",
         "comment class 1 rubbish bin",
-        "comment class 2 T\\xfcr 1",
+        "comment class 2 T\\xfcr\\n1",
         "element vertex 2",
         "property float x",
         "property float y",
