@@ -16,7 +16,7 @@ from torch.nn.functional import interpolate
 
 from stsem import hostclock
 from stsem.classes import Labels
-from stsem.frame import Image
+from stsem.frame import Frame, Image
 from stsem.inference.inferencer import Inferencer, segmentation
 from stsem.inference.network import load_network
 from stsem.inference.preprocess import labels_at, network_inputs
@@ -108,7 +108,7 @@ def _judge(args: argparse.Namespace) -> None:
     spent = []
     for image, previous, truth in _samples(args):
         begun = hostclock.wall_ns()
-        output = inferencer.compute(image, previous)
+        output = inferencer.compute(Frame(0, 0, image, previous))
         spent.append(hostclock.wall_ns() - begun)
         matrix.update(truth, segmentation(output, (image.shape[1], image.shape[0])).labels)
     _show(f"{args.network}, {len(spent)} frames, median {np.median(spent) / 1e6:.0f} ms", matrix)

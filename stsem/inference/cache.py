@@ -19,8 +19,9 @@ import numpy as np
 import platformdirs
 
 from stsem.errors import OutputError
-from stsem.frame import Frame, Image, Segmentation
+from stsem.frame import Frame, Segmentation
 from stsem.inference.inferencer import CONFIDENCE_STEPS, Identity, Inferencer, Output, segmentation
+from stsem.inference.network import Network
 
 _MAGIC = b"stsem-o1"
 _HEADER = struct.Struct("<8sHHIII")  # magic, width, height, checksum of the input, of the payload, payload size
@@ -81,19 +82,26 @@ class CachedInferencer:
 
     def infer(self, frame: Frame) -> Segmentation:
         """See `Inferencer.infer`."""
-        source = checksum(frame.image, frame.previous)
+        source = checksum(frame, self.network)
         output = self._cache.get(frame.stamp_ns, source)
         if output is None:
-            computed = self._inferencer.compute(frame.image, frame.previous)
+            computed = self._inferencer.compute(frame)
             self._cache.put(frame.stamp_ns, source, computed)
             output = self._cache.get(frame.stamp_ns, source) or computed
         return segmentation(output, frame.size)
 
 
-def checksum(image: Image, previous: Image | None) -> int:
-    """CRC-32 of the pixels of a frame and its predecessor."""
-    crc = zlib.crc32(np.ascontiguousarray(image).data, image.shape[1])
-    return crc if previous is None else zlib.crc32(np.ascontiguousarray(previous).data, crc)
+def checksum(frame: Frame, network: Network) -> int:
+    """CRC-32 of what the network sees of a frame: the pixels and shapes of its inputs, whatever else was loaded."""
+    previous = frame.previous if network.has_difference else None
+    depth = frame.depth if network.has_depth else None
+    crc = 0
+    for pixels in (frame.image, previous, depth):
+        if pixels is None:
+            crc = zlib.crc32(b"none", crc)
+        else:
+            crc = zlib.crc32(np.ascontiguousarray(pixels).data, zlib.crc32(repr(pixels.shape).encode(), crc))
+    return crc
 
 
 def pack(output: Output, source: int) -> bytes:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from stsem.classes import NO_LABEL, Labels
 from stsem.errors import NetworkError, UsageError
-from stsem.frame import Frame, Image, Segmentation
+from stsem.frame import Frame, Segmentation
 from stsem.inference.backends import DEFAULT_BACKEND, DEFAULT_PRECISION, choose_backend
 from stsem.inference.cpu import cpu_features
 from stsem.inference.network import Network, OutputKind
@@ -74,11 +74,11 @@ class Inferencer:
         Raises:
             NetworkError: the graph fails, or returns what cannot be labels and confidence.
         """
-        return segmentation(self.compute(frame.image, frame.previous), frame.size)
+        return segmentation(self.compute(frame), frame.size)
 
-    def compute(self, image: Image, previous: Image | None) -> Output:
-        """The same at the network's size, from (H, W, 3) uint8 RGB images."""
-        inputs = network_inputs(image, previous, self.network.sidecar)
+    def compute(self, frame: Frame) -> Output:
+        """The same at the network's size."""
+        inputs = network_inputs(frame.image, frame.previous, self.network.sidecar, frame.depth)
         if self.network.output is OutputKind.LABELS:
             labels, confidence = self._session.run(["labels", "confidence"], inputs)
             return self._checked(labels[0], confidence[0])

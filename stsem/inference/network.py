@@ -15,6 +15,9 @@ DEFAULT = "default"
 CLASS_COUNT = "stsem.class_count"
 """Metadata key in our ONNX files: the number of classes, since `labels` does not show it."""
 
+CHANNELS = {"image": 3, "difference": 3, "depth": 1}
+"""Inputs there can be: name -> channels; each (1, channels, H, W) float32."""
+
 _FLOAT, _UINT8 = "tensor(float)", "tensor(uint8)"
 
 
@@ -34,7 +37,7 @@ class Network:
     Args:
         name: file name without suffix.
         path: the ONNX file.
-        sidecar: size of the input, normalisation, classes, difference.
+        sidecar: size of the input, normalisation, classes, how difference and depth are formed.
         output: what the graph returns.
         model_sha256, sidecar_sha256: of the two files' bytes, hexadecimal.
     """
@@ -65,6 +68,11 @@ class Network:
     def has_difference(self) -> bool:
         """Whether it also takes the image difference."""
         return self.sidecar.difference is not None
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether it also takes depth."""
+        return self.sidecar.depth is not None
 
 
 def shipped_networks() -> tuple[str, ...]:
@@ -118,16 +126,16 @@ def _read(path: Path) -> bytes:
 
 
 def _check_inputs(signature: Signature, sidecar: Sidecar, path: Path) -> None:
-    wanted = {"image", "difference"} if sidecar.difference else {"image"}
+    wanted = set(sidecar.inputs)
     got = {port.name for port in signature.inputs}
     if got != wanted:
         raise NetworkError(
             f"The network {path} has the inputs {_listed(got)}, but its sidecar calls for {_listed(wanted)}; "
-            "the section [difference] of the sidecar stands for the input 'difference'."
+            "the sections [difference] and [depth] of the sidecar stand for the inputs of these names."
         )
     width, height = sidecar.size
     for port in signature.inputs:
-        _check_port(port, _FLOAT, (1, 3, height, width), path)
+        _check_port(port, _FLOAT, (1, CHANNELS[port.name], height, width), path)
 
 
 def _output_kind(signature: Signature, sidecar: Sidecar, path: Path) -> OutputKind:

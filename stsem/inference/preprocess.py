@@ -5,8 +5,8 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.classes import Labels
-from stsem.frame import Image
-from stsem.inference.sidecar import Difference, Sidecar
+from stsem.frame import Depth, Image
+from stsem.inference.sidecar import DepthForm, Difference, Sidecar
 
 Tensor = npt.NDArray[np.float32]
 
@@ -34,16 +34,39 @@ def difference_input(image: Image, previous: Image | None, difference: Differenc
     return np.ascontiguousarray(delta.transpose(2, 0, 1), np.float32) * np.float32(difference.scale / 255.0)
 
 
-def network_inputs(image: Image, previous: Image | None, sidecar: Sidecar) -> dict[str, Tensor]:
-    """Inputs by name, each (1, 3, h, w) float32, for one camera image (H, W, 3) uint8 RGB and its predecessor.
+def depth_input(depth: Depth | None, form: DepthForm, size: tuple[int, int]) -> Tensor:
+    """(1, h, w) float32 at `size` (width, height): scaled metres, and the form's stand-in where depth is unknown.
 
-    A predecessor of another size than `image` is stretched likewise.
+    Args:
+        depth: (H, W) float32 metres, NaN unknown, of any size; None where the frame has none: unknown all over.
+        form: of the sidecar.
+        size: of the network's input.
+    """
+    if depth is None:
+        return np.full((1, size[1], size[0]), form.unknown, np.float32)
+    nearest = cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST_EXACT)
+    scaled = nearest * np.float32(form.scale)
+    return np.where(np.isfinite(nearest), scaled, np.float32(form.unknown))[None]
+
+
+def network_inputs(
+    image: Image, previous: Image | None, sidecar: Sidecar, depth: Depth | None = None
+) -> dict[str, Tensor]:
+    """Inputs by name, each (1, channels, h, w) float32, for one frame.
+
+    Args:
+        image: (H, W, 3) uint8 RGB.
+        previous: its predecessor in the log, stretched likewise whatever its size; None for the first frame.
+        sidecar: of the network; what it has no section for is not looked at.
+        depth: as for `depth_input`.
     """
     now = stretched(image, sidecar.size)
     inputs = {"image": image_input(now, sidecar)[None]}
     if sidecar.difference:
         before = None if previous is None else stretched(previous, sidecar.size)
         inputs["difference"] = difference_input(now, before, sidecar.difference)[None]
+    if sidecar.depth:
+        inputs["depth"] = depth_input(depth, sidecar.depth, sidecar.size)[None]
     return inputs
 
 

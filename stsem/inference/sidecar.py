@@ -5,17 +5,20 @@ import json
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeGuard
 
 from stsem.classes import ClassSet
 from stsem.errors import ClassTableError, NetworkError
 
 SIGN = "current - previous"
 PARTNER = "previous frame"
+UNIT = "metres"
 
-_KEYS = ("size", "mean", "std", "classes", "colours", "note", "difference")
+_KEYS = ("size", "mean", "std", "classes", "colours", "note", "difference", "depth")
 _REQUIRED = ("size", "mean", "std", "classes")
 _DIFFERENCE_KEYS = ("sign", "scale", "partner")
+_DEPTH_KEYS = ("unit", "scale", "unknown")
 
 Triple = tuple[float, float, float]
 
@@ -31,6 +34,21 @@ class Difference:
 
 
 @dataclass(frozen=True)
+class DepthForm:
+    """How the input `depth` is formed: `scale` times metres along the optical axis, one channel.
+
+    The nearest pixel of the frame's depth is taken, so that edges do not mix.
+
+    Args:
+        scale: factor on the metres.
+        unknown: what stands where depth is unknown, and all over for a frame without depth.
+    """
+
+    scale: float = 1.0
+    unknown: float = 0.0
+
+
+@dataclass(frozen=True)
 class Sidecar:
     """What a network expects and returns.
 
@@ -40,6 +58,7 @@ class Sidecar:
         classes: ids of its labels.
         difference: how the second input is formed; None for a network with the image alone.
         note: where it comes from; free text.
+        depth: how the input of that name is formed; None for a network that does not take depth.
     """
 
     size: tuple[int, int]
@@ -48,6 +67,22 @@ class Sidecar:
     classes: ClassSet
     difference: Difference | None = None
     note: str = ""
+    depth: DepthForm | None = None
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the graph's inputs: the image, and what there is a section for."""
+        sections = {"difference": self.difference, "depth": self.depth}
+        return ("image", *(name for name, section in sections.items() if section is not None))
+
+    def for_inputs(self, names: Iterable[str]) -> "Sidecar":
+        """The same for a network that takes `names`: without the sections it has no use for, and with plain depth."""
+        wanted = frozenset(names)
+        return replace(
+            self,
+            difference=self.difference if "difference" in wanted else None,
+            depth=(self.depth or DepthForm()) if "depth" in wanted else None,
+        )
 
 
 def parse(text: str, where: str) -> Sidecar:
@@ -69,7 +104,7 @@ def parse(text: str, where: str) -> Sidecar:
         raise NetworkError(f"The sidecar {where} has std = {list(std)}; every value must be above 0.")
     return Sidecar(
         _size(table, where), _triple(table, "mean", where), std, _classes(table, where), _difference(table, where),
-        str(table.get("note", "")),
+        str(table.get("note", "")), _depth(table, where),
     )  # fmt: skip
 
 
@@ -88,6 +123,10 @@ def render(sidecar: Sidecar) -> str:
     if sidecar.difference:
         lines += ["", "[difference]  # RGB in 0..1 at the network's size, zero for the first frame",
                   f'sign = "{SIGN}"', f"scale = {sidecar.difference.scale}", f'partner = "{PARTNER}"']  # fmt: skip
+    if sidecar.depth:
+        form = sidecar.depth
+        lines += ["", "[depth]  # one channel at the network's size, nearest neighbour",
+                  f'unit = "{UNIT}"', f"scale = {form.scale}", f"unknown = {form.unknown}"]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 
@@ -115,7 +154,7 @@ def _numbers(table: Mapping[str, object], key: str, count: int, where: str) -> l
     return value
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
@@ -150,18 +189,37 @@ def _is_colour(value: object) -> bool:
 
 
 def _difference(table: Mapping[str, object], where: str) -> Difference | None:
-    section = table.get("difference")
+    section = _section(table, "difference", _DIFFERENCE_KEYS, {"sign": SIGN, "partner": PARTNER}, where)
+    return None if section is None else Difference(_factor(section, "difference", "scale", 1.0, where))
+
+
+def _depth(table: Mapping[str, object], where: str) -> DepthForm | None:
+    section = _section(table, "depth", _DEPTH_KEYS, {"unit": UNIT}, where)
+    if section is None:
+        return None
+    return DepthForm(_factor(section, "depth", "scale", 1.0, where), _factor(section, "depth", "unknown", 0.0, where))
+
+
+def _section(
+    table: Mapping[str, object], name: str, keys: tuple[str, ...], fixed: Mapping[str, str], where: str
+) -> Mapping[str, object] | None:
+    """The table [name], whose keys are among `keys`; those of `fixed` have one valid value each."""
+    section = table.get(name)
     if section is None:
         return None
     if not isinstance(section, dict):
-        raise NetworkError(f"The sidecar {where} has difference = {section!r}; expected a table [difference].")
-    _check_keys(section, _DIFFERENCE_KEYS, where, " in [difference]")
-    for key, expected in (("sign", SIGN), ("partner", PARTNER)):
+        raise NetworkError(f"The sidecar {where} has {name} = {section!r}; expected a table [{name}].")
+    _check_keys(section, keys, where, f" in [{name}]")
+    for key, expected in fixed.items():
         if section.get(key, expected) != expected:
             raise NetworkError(
                 f"The sidecar {where} has {key} = {section[key]!r}; the only {key} known is {expected!r}."
             )
-    scale = section.get("scale", 1.0)
-    if not _is_number(scale):
-        raise NetworkError(f"The sidecar {where} has scale = {scale!r} in [difference]; expected a number.")
-    return Difference(float(scale))
+    return section
+
+
+def _factor(section: Mapping[str, object], name: str, key: str, default: float, where: str) -> float:
+    value = section.get(key, default)
+    if not _is_number(value):
+        raise NetworkError(f"The sidecar {where} has {key} = {value!r} in [{name}]; expected a number.")
+    return float(value)

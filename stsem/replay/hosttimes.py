@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from stsem import hostclock
-from stsem.frame import Frame, Image, Segmentation
+from stsem.frame import Frame, Segmentation
 from stsem.geometry.features import Features
 from stsem.geometry.homography import Homography
 from stsem.inference.inferencer import Inferencer, Output
@@ -58,9 +58,9 @@ class TimedInferencer(Inferencer):
         super().__init__(network, backend=backend, precision=precision, threads=threads)
         self._times = times
 
-    def compute(self, image: Image, previous: Image | None) -> Output:
+    def compute(self, frame: Frame) -> Output:
         """See `Inferencer.compute`."""
-        return self._times.measure("segment", lambda: super(TimedInferencer, self).compute(image, previous))
+        return self._times.measure("segment", lambda: super(TimedInferencer, self).compute(frame))
 
 
 @dataclass(frozen=True)

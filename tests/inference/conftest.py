@@ -40,9 +40,9 @@ def files(tmp_path: Path) -> Files:
 def _model(
     nodes: list[onnx.NodeProto], inputs: list[str], outputs: dict[str, tuple[int, list[int]]]
 ) -> onnx.ModelProto:
-    shape = [1, 3, HEIGHT, WIDTH]
+    shapes = {name: [1, 1 if name == "depth" else 3, HEIGHT, WIDTH] for name in inputs}
     graph = helper.make_graph(
-        nodes, "net", [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name in inputs],
+        nodes, "net", [helper.make_tensor_value_info(name, TensorProto.FLOAT, shapes[name]) for name in inputs],
         [helper.make_tensor_value_info(name, *kind) for name, kind in outputs.items()],
     )  # fmt: skip
     return helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
@@ -75,6 +75,17 @@ def _difference() -> onnx.ModelProto:
         [_axes(), zero, helper.make_node("Mul", ["image", "zero"], ["nothing"]),
          helper.make_node("Add", ["difference", "nothing"], ["sum"]), *_answer("sum")],
         ["image", "difference"], _LABELS,
+    )  # fmt: skip
+
+
+def _depth() -> onnx.ModelProto:
+    """The same of colour plus depth / 4 in the green channel: what is 4 m away is green, confidence at most 1."""
+    weights = helper.make_tensor("weights", TensorProto.FLOAT, [1, 3, 1, 1], [0.0, 0.25, 0.0])
+    return _model(
+        [_axes(), helper.make_node("Constant", [], ["weights"], value=weights),
+         helper.make_node("Mul", ["depth", "weights"], ["green"]),
+         helper.make_node("Add", ["image", "green"], ["sum"]), *_answer("sum")],
+        ["image", "depth"], _LABELS,
     )  # fmt: skip
 
 
@@ -121,6 +132,7 @@ def _nan_confidence() -> onnx.ModelProto:
 GRAPHS: dict[str, Callable[[], onnx.ModelProto]] = {
     "labels": _strongest_channel,
     "difference": _difference,
+    "depth": _depth,
     "logits": _logits,
     "wide labels": _wide_labels,
     "other output": _other_output,

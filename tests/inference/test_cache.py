@@ -16,6 +16,7 @@ from stsem.inference.inferencer import Inferencer, Output
 from stsem.inference.network import load_network
 
 Files = Callable[..., Path]
+SIDECAR = 'size = [16, 12]\nmean = [0.0, 0.0, 0.0]\nstd = [1.0, 1.0, 1.0]\nclasses = ["red", "green", "blue"]\n'
 RNG = np.random.default_rng(0)
 
 
@@ -33,9 +34,9 @@ def _output(width: int = 16, height: int = 12) -> Output:
 class _Counting(Inferencer):
     calls = 0
 
-    def compute(self, *frames: object) -> Output:  # type: ignore[override]
+    def compute(self, frame: Frame) -> Output:
         self.calls += 1
-        return super().compute(*frames)  # type: ignore[arg-type]
+        return super().compute(frame)
 
 
 @pytest.fixture
@@ -114,13 +115,24 @@ def test_arbitrary_bytes_are_no_entry(data: bytes) -> None:
     assert unpack(b"stsem-o1" + data, 0) is None
 
 
-def test_the_checksum_sees_both_frames() -> None:
-    """One changed value in either image, and a missing predecessor, change it."""
-    image, previous = _frame(0).image, _frame(1).image
-    other = previous.copy()
-    other[0, 0, 0] ^= 1
-    sums = {checksum(image, previous), checksum(image, other), checksum(image, None), checksum(other, previous)}
-    assert len(sums) == 4
+@pytest.mark.parametrize(("kind", "sections", "looks_at"), [
+    ("labels", "", {"image"}), ("difference", "[difference]\n", {"image", "previous"}),
+    ("depth", "[depth]\n", {"image", "depth"}),
+])  # fmt: skip
+def test_the_checksum_sees_what_the_network_sees(files: Files, kind: str, sections: str, looks_at: set[str]) -> None:
+    """One changed value of an input, or a missing one, changes it; what is loaded for others does not."""
+    network = load_network(files(kind, SIDECAR + sections))
+    frame = replace(_frame(0), depth=np.full((24, 32), 2, np.float32))
+    sums = {checksum(frame, network)}
+    for part in ("image", "previous", "depth"):
+        changed = getattr(frame, part).copy()
+        changed.flat[5] += 1
+        lacking = () if part == "image" else (replace(frame, **{part: None}),)
+        others = {checksum(other, network) for other in (replace(frame, **{part: changed}), *lacking)}
+        assert others.isdisjoint(sums) == (part in looks_at), part
+        sums |= others
+    swapped = replace(frame, image=frame.previous, previous=frame.image)
+    assert checksum(swapped, network) not in sums
 
 
 def test_usage_and_clear(inferencer: _Counting, tmp_path: Path) -> None:

@@ -53,6 +53,18 @@ def test_the_difference_is_current_minus_previous(files: Files) -> None:
     assert not first.confidence.any()
 
 
+def test_depth_reaches_the_network(files: Files) -> None:
+    """Green where it is 4 m away; where depth is unknown, and in a frame without, colour alone counts."""
+    inferencer = Inferencer(load_network(files("depth", SIDECAR + "[depth]\n")), threads=1)
+    depth = np.full((24, 32), 4, np.float32)
+    depth[12:] = np.nan
+    answer = inferencer.infer(Frame(0, 0, _halves(0, 2) // 2, depth=depth))
+    assert (answer.labels[:12] == 1).all()
+    for labels in (answer.labels[12:], inferencer.infer(Frame(0, 0, _halves(0, 2))).labels):
+        assert (labels[:, :16] == 0).all()
+        assert (labels[:, 16:] == 2).all()
+
+
 def test_logits_are_decided_outside(files: Files) -> None:
     """Half-size logits: softmax, enlargement, argmax; the confidence is the probability."""
     answer = Inferencer(load_network(files("logits")), threads=1).infer(Frame(0, 0, _halves(2, 1)))

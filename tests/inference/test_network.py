@@ -32,12 +32,22 @@ def test_the_fingerprint_covers_both_files(files: Files) -> None:
     assert one.sha256 != other.sha256
 
 
+def test_a_network_with_depth(files: Files) -> None:
+    """One channel, and a section of its own."""
+    network = load_network(files("depth", SIDECAR + "[depth]\n"))
+    assert (network.has_depth, network.has_difference) == (True, False)
+    assert network.sidecar.inputs == ("image", "depth")
+    assert not load_network(files()).has_depth
+
+
 @pytest.mark.parametrize(
     ("kind", "sidecar", "metadata", "part"),
     [
         ("labels", None, {}, "has no sidecar net.toml"),
         ("labels", WITH_DIFFERENCE, {}, "has the inputs 'image', but its sidecar calls for 'difference', 'image'"),
         ("difference", SIDECAR, {}, "has the inputs 'difference', 'image', but its sidecar calls for 'image'"),
+        ("depth", SIDECAR, {}, "has the inputs 'depth', 'image', but its sidecar calls for 'image'; the sections"),
+        ("depth", WITH_DIFFERENCE + "[depth]\n", {}, "its sidecar calls for 'depth', 'difference', 'image'"),
         ("other input", SIDECAR, {}, "has the inputs 'input'"),
         ("other output", SIDECAR, {}, "has the outputs 'out'; expected 'labels' and 'confidence', or 'logits'"),
         ("wide labels", SIDECAR, {}, "'labels' as tensor(int64) of shape (1, 12, 16)"),

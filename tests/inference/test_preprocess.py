@@ -1,5 +1,7 @@
 """Inputs by hand-worked numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,8 @@ from stsem.classes import ClassSet
 from stsem.errors import UsageError
 from stsem.inference import cpu
 from stsem.inference.cpu import cpu_features
-from stsem.inference.preprocess import labels_at, network_inputs, stretched
-from stsem.inference.sidecar import Difference, Sidecar
+from stsem.inference.preprocess import depth_input, labels_at, network_inputs, stretched
+from stsem.inference.sidecar import DepthForm, Difference, Sidecar
 from stsem.inference.threads import set_threads
 
 SIDECAR = Sidecar((4, 2), (0.5, 0.25, 0.0), (0.5, 0.25, 1.0), ClassSet(("a",)), Difference(3.0))
@@ -33,6 +35,27 @@ def test_a_previous_frame_of_another_size_is_stretched() -> None:
     """A log may change its resolution on the way."""
     inputs = network_inputs(np.full((2, 4, 3), 9, np.uint8), np.full((8, 16, 3), 9, np.uint8), SIDECAR)
     assert not inputs["difference"].any()
+
+
+def test_depth_by_hand() -> None:
+    """Scaled metres of the nearest pixel: no value lies between the two of an edge; unknown is what the form says."""
+    depth = np.array([[1, 1, 9, 9], [1, 1, 9, np.nan]], np.float32)
+    assert depth_input(depth, DepthForm(), (4, 2)).tolist() == [[[1, 1, 9, 9], [1, 1, 9, 0]]]
+    assert depth_input(depth, DepthForm(0.5, -1.0), (2, 2)).tolist() == [[[0.5, 4.5], [0.5, -1]]]
+    larger = depth_input(depth, DepthForm(), (7, 5))
+    assert larger.dtype == np.float32
+    assert set(larger.flat) == {0, 1, 9}
+
+
+def test_the_depth_of_a_frame_without_one_is_unknown_all_over() -> None:
+    """Also in a network's inputs; without a section there is no such input, whatever the frame has."""
+    image, depth = np.zeros((2, 4, 3), np.uint8), np.ones((2, 4), np.float32)
+    with_depth = replace(SIDECAR, depth=DepthForm(2.0, 0.25))
+    assert (network_inputs(image, None, with_depth)["depth"] == 0.25).all()
+    inputs = network_inputs(image, None, with_depth, depth)
+    assert inputs["depth"].shape == (1, 1, 2, 4)
+    assert (inputs["depth"] == 2).all()
+    assert network_inputs(image, None, SIDECAR, depth).keys() == {"image", "difference"}
 
 
 def test_stretching_is_bilinear_with_aligned_centres() -> None:

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from stsem.classes import ClassSet
 from stsem.errors import NetworkError
-from stsem.inference.sidecar import Difference, Sidecar, parse, render
+from stsem.inference.sidecar import DepthForm, Difference, Sidecar, parse, render
 
 PLAIN = 'size = [41, 89]\nmean = [0.5, 0.5, 0.5]\nstd = [0.2, 0.2, 0.2]\nclasses = ["wall", "rubbish bin"]\n'
 
@@ -23,6 +23,7 @@ _names = st.lists(_name, min_size=1, max_size=5, unique_by=str.casefold)
     names=_names,
     scale=st.none() | st.floats(-10, 10),
     note=st.text(st.characters(codec="utf-8")),
+    depth=st.none() | st.builds(DepthForm, st.floats(-10, 10), st.floats(-1, 0)),
 )
 def test_what_is_written_reads_back_equal(
     size: tuple[int, int],
@@ -31,10 +32,11 @@ def test_what_is_written_reads_back_equal(
     names: list[str],
     scale: float | None,
     note: str,
+    depth: DepthForm | None,
 ) -> None:
     """Any name, number and note survives the way through TOML."""
     classes = ClassSet(tuple(names), tuple((i, 2 * i, 255) for i in range(len(names))))
-    sidecar = Sidecar(size, mean, std, classes, None if scale is None else Difference(scale), note)
+    sidecar = Sidecar(size, mean, std, classes, None if scale is None else Difference(scale), note, depth)
     assert parse(render(sidecar), "x.toml") == sidecar
 
 
@@ -48,7 +50,11 @@ def test_what_is_written_reads_back_equal(
         (PLAIN + '[difference]\nsign = "previous - current"\n', "the only sign known is 'current - previous'"),
         (PLAIN + '[difference]\npartner = "previous keyframe"\n', "the only partner known is 'previous frame'"),
         (PLAIN + "[difference]\nscale = true\n", "expected a number"),
-        (PLAIN + "difference = 3\n", "expected a table"),
+        (PLAIN + "difference = 3\n", "expected a table [difference]"),
+        (PLAIN + "depth = 3\n", "expected a table [depth]"),
+        (PLAIN + "[depth]\nscael = 1\n", "'scael' in [depth]; did you mean 'scale'"),
+        (PLAIN + '[depth]\nunit = "mm"\n', "the only unit known is 'metres'"),
+        (PLAIN + '[depth]\nunknown = "0"\n', "unknown = '0' in [depth]; expected a number"),
         (PLAIN.replace("mean", "note"), "has no key 'mean'"),
         (PLAIN.replace("[41, 89]", "[41]"), "expected a list of 2 numbers"),
         (PLAIN.replace("[41, 89]", "[41, 0]"), "expected [width, height]"),
@@ -72,3 +78,20 @@ def test_the_difference_has_defaults() -> None:
     """An empty section asks for the plain difference."""
     assert parse(PLAIN + "[difference]\n", "x").difference == Difference(1.0)
     assert parse(PLAIN, "x").difference is None
+
+
+def test_depth_has_defaults() -> None:
+    """An empty section asks for metres, with 0 where they are unknown."""
+    assert parse(PLAIN + "[depth]\n", "x").depth == DepthForm(1.0, 0.0)
+    assert parse(PLAIN, "x").depth is None
+
+
+def test_a_sidecar_follows_the_inputs_of_a_network() -> None:
+    """Sections without use go; depth stays as it is or comes as metres; the scale of a difference cannot be guessed."""
+    both = parse(PLAIN + "[difference]\nscale = 4.0\n[depth]\nscale = 0.1\n", "x")
+    assert both.inputs == ("image", "difference", "depth")
+    assert both.for_inputs(("image",)).inputs == ("image",)
+    assert both.for_inputs(("image", "depth")).depth == DepthForm(0.1)
+    assert both.for_inputs(("difference",)).difference == Difference(4.0)
+    plain = parse(PLAIN, "x").for_inputs(("image", "difference", "depth"))
+    assert (plain.depth, plain.difference) == (DepthForm(), None)
