@@ -36,9 +36,9 @@ def measure(
         {"model": model, "propagation": propagation, "backend": backend, "precision": precision, "count_decode": True}
     )
     with open_log([log]) as opened:
-        fused = can_map(opened, config)
-        frames = calibration_frames(opened, fused=fused)
-        wanted = subject(opened, config, build_model(opened, config), cores=(1, 2), fused=fused)
+        built, fused = build_model(opened, config), can_map(opened, config)
+        frames = calibration_frames(opened, built.needs(fused=fused))
+        wanted = subject(opened, config, built, cores=(1, 2), fused=fused)
         profile = calibrate(wanted, frames, samples=samples, limit_ns=round(seconds * 1e9))
     profile.save(out)
     for stage, times in profile.samples_ns.items():

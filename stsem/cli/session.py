@@ -146,7 +146,8 @@ def _sustainable(session: Session) -> dict[str, Sustainable]:
         return {}
     usable = truth_frames(log) if config.is_oracle else None
     deadline = deadline_ns(config.deadline_ms, log.period_ns, Fraction(1))
-    probe = Probe(log, config, costs.of, fused=session.fused, usable=usable, patience_ns=deadline)
+    needs = session.model.needs(fused=session.fused)
+    probe = Probe(log, config, costs.of, needs=needs, fused=session.fused, usable=usable, patience_ns=deadline)
     return {
         mode.name: search(partial(probe.attempt, mode), capture_hz=1e9 / log.period_ns, deadline_ns=deadline)
         for mode in config.modes

@@ -73,6 +73,8 @@ class Identity(Part):
     """Vector features of the CPU that decide the network's rounding."""
     model: str = ""
     """Name of the network, or `oracle`."""
+    model_inputs: tuple[str, ...] = ()
+    """What the network is given: `image`, `difference` to the previous frame, `depth`; empty for the oracle."""
     model_sha256: str | None = None
     """sha256 of the ONNX file; null for the oracle."""
     sidecar_sha256: str | None = None

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from stsem.classes import NO_LABEL, ClassSet, Labels, translation
-from stsem.errors import ClassTableError
+from stsem.errors import ChannelError, ClassTableError
 from stsem.inference.backends import choose_backend
 from stsem.inference.cache import CachedInferencer, OutputCache, cache_root
 from stsem.inference.network import Network, load_network
 from stsem.log.log import Log
+from stsem.log.plan import NEEDS
 from stsem.replay.answer import AnswerRule, Prediction
 from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTimes, TimedInferencer, TimedPropagation, TimedRegister
@@ -48,6 +49,11 @@ class Model:
     reason: str
     segmenter: Callable[[int, StageTimes], Segmenter]
 
+    def needs(self, *, fused: bool) -> frozenset[str]:
+        """Roles beside colour whose messages a frame waits for (DESIGN 3); with a map (`fused`) depth and poses."""
+        depth = frozenset({"depth"}) if self.network is not None and self.network.has_depth else frozenset[str]()
+        return depth | NEEDS if fused else depth
+
 
 def build_model(log: Log, config: RunConfig) -> Model:
     """The network or the oracle, and how its classes meet those of the log.
@@ -56,12 +62,14 @@ def build_model(log: Log, config: RunConfig) -> Model:
         UsageError: there is no such backend or precision; it is said of the oracle, too, which needs none.
         NetworkError: the network cannot be used.
         ClassTableError: the oracle without truth, or a class map that cannot be read or names unknown classes.
+        ChannelError: the network takes depth, but the log has none that can be used.
     """
     choose_backend(config.backend, config.precision)
     class_map = _class_map(config.class_map)
     if config.is_oracle:
         return _oracle(log)
     network = load_network(config.model)
+    _check_depth(network, log)
     classes, table, reason = _meeting(network.classes, log, class_map)
     make = partial(_network_segmenter, network, table, log, config)
     return Model(Path(config.model).name, network, classes, table, reason, make)
@@ -107,6 +115,16 @@ def _oracle(log: Log) -> Model:
         )
     segmenter = OracleSegmenter(lambda index: log.plans[index].has_truth, log.truth)
     return Model("oracle", None, log.classes, None, "", lambda threads, times: Memo(segmenter))
+
+
+def _check_depth(network: Network, log: Log) -> None:
+    if network.has_depth and log.info.choice.depth is None:
+        why = next((f" ({str(said).rstrip('.')})" for said in log.info.warnings if "depth" in said), "")
+        raise ChannelError(
+            f"The network {network.name} takes depth, but {log.info.name} has no depth channel that can be used{why}; "
+            "name one with --topic depth=TOPIC, or choose another network with --model.",
+            "depth",
+        )
 
 
 def _meeting(network: ClassSet, log: Log, class_map: dict[str, str]) -> tuple[ClassSet, Labels, str]:

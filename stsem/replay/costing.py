@@ -15,7 +15,6 @@ from stsem.frame import Frame
 from stsem.inference.cache import cache_root
 from stsem.inference.network import DEFAULT, Network, load_network
 from stsem.log.log import Log
-from stsem.log.plan import NEEDS
 from stsem.replay.build import Model
 from stsem.replay.calibrate import Subject, measure
 from stsem.replay.config import RunConfig
@@ -51,7 +50,7 @@ def costing(log: Log, config: RunConfig, model: Model, *, fused: bool, say: Call
 
     Args:
         log, config, model: of the run.
-        fused: whether frames are decoded with depth.
+        fused: whether a map stands beside the path.
         say: told what takes time.
 
     Raises:
@@ -96,22 +95,25 @@ def _of_profile(name: str, profile: CostProfile, log: Log, config: RunConfig) ->
 def subject(log: Log, config: RunConfig, model: Model, cores: tuple[int, ...], *, fused: bool) -> Subject:
     """What a profile for this configuration must hold; `cores`: how many the network may claim."""
     network: Network = model.network or load_network(DEFAULT)
-    decode = _decoder(log, fused) if config.count_decode else None
+    decode = _decoder(log, depth="depth" in model.needs(fused=fused)) if config.count_decode else None
     return Subject(
         network, config.backend, config.precision, cores, PROPAGATIONS[config.propagation](), config.seed, decode
     )  # fmt: skip
 
 
-def calibration_frames(log: Log, *, fused: bool) -> list[Frame]:
+def calibration_frames(log: Log, needs: frozenset[str]) -> list[Frame]:
     """The first decodable frames of the log that lack nothing, or, when there are too few of them, the first at all.
+
+    Args:
+        log: opened.
+        needs: roles that stages look at (`Model.needs`).
 
     Raises:
         CostError: fewer than two frames can be decoded.
     """
     found: list[Frame] = []
-    needs = NEEDS if fused else frozenset[str]()
     indices = [plan.index for plan in sorted(log.plans, key=lambda plan: bool(plan.missing(needs)))]
-    with contextlib.closing(log.frames(indices, depth=fused, previous=True, truth=False)) as supply:
+    with contextlib.closing(log.frames(indices, depth="depth" in needs, previous=True, truth=False)) as supply:
         while len(found) < _CALIBRATION_FRAMES and (loaded := next(supply, None)) is not None:
             if loaded.frame is not None:
                 found.append(loaded.frame)
@@ -123,7 +125,7 @@ def calibration_frames(log: Log, *, fused: bool) -> list[Frame]:
 def _calibrated(log: Log, config: RunConfig, model: Model, fused: bool, say: Callable[[str], None]) -> CostProfile:
     cores = tuple(sorted({min(mode.network_cores, config.cores) for mode in config.modes}))
     wanted = subject(log, config, model, cores, fused=fused)
-    frames = calibration_frames(log, fused=fused)
+    frames = calibration_frames(log, model.needs(fused=fused))
     about = {
         "machine": hostclock.machine_name(), "network": wanted.network.sha256, "size": frames[0].size,
         "backend": [wanted.backend, wanted.precision], "cores": wanted.network_cores,
@@ -160,13 +162,13 @@ def _keep(profile: CostProfile, path: Path) -> None:
     profile.save(path)
 
 
-def _decoder(log: Log, fused: bool) -> Callable[[], object]:
+def _decoder(log: Log, *, depth: bool) -> Callable[[], object]:
     """Decodes the frames of the log in turn, so far apart in time that none is still in memory."""
     supply = itertools.cycle([plan.index for plan in log.plans][:_DECODED_FRAMES])
 
     def decode() -> object:
         try:
-            return log.frame(next(supply), depth=fused, previous=False)
+            return log.frame(next(supply), depth=depth, previous=False)
         except DecodeError:
             return None
 

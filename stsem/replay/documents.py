@@ -102,6 +102,7 @@ def _identity(context: Context) -> Identity:
         versions={"stsem": __version__, "python": platform.python_version(), **versions},
         cpu_features=cpu_features(),
         model=context.model.name,
+        model_inputs=network.sidecar.inputs if network else (),
         model_sha256=network.model_sha256 if network else None,
         sidecar_sha256=network.sidecar_sha256 if network else None,
         costs="" if costing is None else costing.name,
@@ -166,6 +167,12 @@ def _warnings(context: Context) -> tuple[str, ...]:
         for run in context.replayed.runs
         if run.real_time is not None and not any(result.outcome.is_answer for result in run.real_time.results)
     ]
+    if lacking := context.replayed.without_depth:
+        frames = len(context.replayed.slots)
+        found.append(
+            f"{lacking} of {frames} frames have no depth, which the network {context.model.name} takes; it is given "
+            "them as unknown all over."
+        )
     costing = context.costing
     if costing is not None and costing.profile is not None and costing.profile.disturbed:
         found.append("The cost profile was measured while other work held a core; its durations are too long.")

@@ -10,7 +10,6 @@ from stsem.classes import Labels
 from stsem.frame import Frame, Image
 from stsem.inference.threads import set_threads
 from stsem.log.log import Loaded, Log
-from stsem.log.plan import NEEDS
 from stsem.replay.build import NETWORK_THREADS, Model
 from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTime, StageTimes
@@ -45,6 +44,7 @@ class Replayed:
         pictures: a few frames.
         stage_times: stage -> what it cost on this host.
         wall_ns: wall-clock duration of the pass.
+        without_depth: frames whose depth the network takes and does not have; None for a network that takes none.
     """
 
     slots: Sequence[Slot]
@@ -52,6 +52,7 @@ class Replayed:
     pictures: tuple[Picture, ...]
     stage_times: Mapping[str, StageTime]
     wall_ns: int
+    without_depth: int | None = None
 
 
 def replay_log(
@@ -75,8 +76,7 @@ def replay_log(
     began = hostclock.wall_ns()
     set_threads(1)
     fused, times = can_map(log, config), StageTimes()
-    roles = NEEDS if fused else frozenset()
-    slots = schedule(log.plans, config.exact_rate, frozenset(), roles)
+    slots = schedule(log.plans, config.exact_rate, frozenset(), model.needs(fused=fused))
     segmenter = model.segmenter(min(NETWORK_THREADS, config.cores), times)
     frames_at = partial(_frames, log, model, fused)
     setup = Setup(
@@ -91,10 +91,11 @@ def replay_log(
         lambda index: next(frames_at([index])),
     )
     lanes = [Lane(setup, mode, _watch_of(mode, watch)) for mode in config.modes]
-    pictures = _feed(frames_at, setup, lanes, progress)
+    pictures, without_depth = _feed(frames_at, setup, lanes, progress)
     end = horizon_ns(slots, log.period_ns, config.exact_rate)
     runs = tuple(lane.finish(end) for lane in lanes)
-    return Replayed(slots, runs, pictures, times.stages, hostclock.wall_ns() - began)
+    counted = without_depth if model.network is not None and model.network.has_depth else None
+    return Replayed(slots, runs, pictures, times.stages, hostclock.wall_ns() - began, counted)
 
 
 def can_map(log: Log, config: RunConfig) -> bool:
@@ -107,7 +108,8 @@ def can_map(log: Log, config: RunConfig) -> bool:
 def _frames(log: Log, model: Model, fused: bool, indices: Iterable[int]) -> Generator[Loaded, None, None]:
     """The frames at `indices` with what this replay looks at."""
     previous = model.network is not None and model.network.has_difference
-    return log.frames(indices, depth=fused, previous=previous, truth=not model.reason)
+    depth = "depth" in model.needs(fused=fused)
+    return log.frames(indices, depth=depth, previous=previous, truth=not model.reason)
 
 
 def _feed(
@@ -115,17 +117,18 @@ def _feed(
     setup: Setup,
     lanes: list[Lane],
     progress: Callable[[int, int], None],
-) -> tuple[Picture, ...]:
-    """Every frame of the log into every lane."""
-    pictures = []
+) -> tuple[tuple[Picture, ...], int]:
+    """Every frame of the log into every lane; returns pictures, and how many decoded frames came without depth."""
+    pictures, without_depth = [], 0
     with closing(frames_at(slot.index for slot in setup.slots)) as frames:
         for done, loaded in enumerate(frames, start=1):
             if loaded.index in setup.pictured and loaded.frame is not None:
                 pictures.append(Picture(loaded.index, loaded.frame.image, loaded.truth))
+            without_depth += loaded.frame is not None and loaded.frame.depth is None
             for lane in lanes:
                 lane.push(loaded)
             progress(done, len(setup.slots))
-    return tuple(pictures)
+    return tuple(pictures), without_depth
 
 
 def _watch_of(mode: Mode, watch: WatchMode | None) -> Callable[[FrameResult, Frame], None] | None:

@@ -24,7 +24,13 @@ def closing_table(document: Document) -> str:
             row.append(deltas.get(path, ""))
     align = ("left", *("right" for _ in headers[1:]))
     table = tabulate(rows, headers, tablefmt="simple", disable_numparse=True, colalign=align)
-    return f"{table}\n\n{basis(document)}"
+    return f"{table}\n\n{basis(document)}{_inputs(document)}"
+
+
+def _inputs(document: Document) -> str:
+    """What the network was given, in a sentence; nothing for the oracle."""
+    who = document.identity
+    return f" Inputs of the network {who.model}: {', '.join(who.model_inputs)}." if who.model_inputs else ""
 
 
 def basis(document: Document) -> str:

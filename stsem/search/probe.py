@@ -94,6 +94,7 @@ class Probe:
     Args:
         log, config: of the run.
         costs_of: cost source of a mode.
+        needs: roles whose messages a frame waits for (`Model.needs`).
         fused: whether a map stands beside the path.
         usable: log indices that can be segmented (the oracle needs truth); None for all.
         patience_ns: how long the clock runs on after the last arrival, at least: with 0 as long as in the real run.
@@ -105,13 +106,14 @@ class Probe:
         config: RunConfig,
         costs_of: CostsOf,
         *,
+        needs: frozenset[str],
         fused: bool,
         usable: frozenset[int] | None,
         patience_ns: int = 0,
     ) -> None:
         self._log, self._config, self._costs_of, self._usable = log, config, costs_of, usable
         self._patience_ns = patience_ns
-        self._roles = NEEDS if fused else frozenset()
+        self._needs, self._fused = needs, fused
         self._policy = policy_of(config)
         self._warps = PROPAGATIONS[config.propagation]().needs_homography
         predicts = any(not mode.segments_every_frame for mode in config.modes)
@@ -121,17 +123,17 @@ class Probe:
 
     def attempt(self, mode: Mode, rate: Fraction) -> list[FrameResult]:
         """Every frame's result when `mode` replays the log at `rate`."""
-        slots = schedule(self._log.plans, rate, frozenset(), self._roles)
+        slots = schedule(self._log.plans, rate, frozenset(), self._needs)
         labels = _NoLabels(self._warps, self._usable)
         prediction = None if mode.segments_every_frame else Prediction(self._policy, labels, self._register)
         capacity, newest_wins = parse_queue(self._config.queue)
-        fusable = frozenset(p.index for p in self._log.plans if self._roles and not p.missing(self._roles))
+        fusable = frozenset(p.index for p in self._log.plans if self._fused and not p.missing(NEEDS))
         machine = Machine(
             cores=self._config.cores,
             network_cores=min(mode.network_cores, self._config.cores),
             costs=self._costs_of(mode),
             mailbox=Mailbox(capacity, newest_wins),
-            fuse=_NoMap(fusable) if self._roles else None,
+            fuse=_NoMap(fusable) if self._fused else None,
             count_decode=self._config.count_decode,
         )
         results = _Results()

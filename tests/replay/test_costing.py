@@ -9,6 +9,7 @@ import pytest
 
 from stsem.errors import CostError, OutputError, UsageError
 from stsem.log.log import Log, open_log
+from stsem.log.plan import NEEDS
 from stsem.replay import costing as module
 from stsem.replay.build import build_model
 from stsem.replay.calibrate import Subject
@@ -128,7 +129,7 @@ def test_calibration_needs_two_frames(tmp_path: Path) -> None:
     """Undecodable ones do not count."""
     path = write_walk(tmp_path / "log.mcap", frames=4, broken=frozenset({0, 2}))
     with open_log([path]) as opened:
-        assert [frame.index for frame in calibration_frames(opened, fused=True)] == [1, 3]
+        assert [frame.index for frame in calibration_frames(opened, NEEDS)] == [1, 3]
     path = write_walk(tmp_path / "short.mcap", frames=4, broken=frozenset({0, 1, 2}))
     with open_log([path]) as opened, pytest.raises(CostError, match="two decodable frames"):
-        calibration_frames(opened, fused=True)
+        calibration_frames(opened, NEEDS)

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from stsem.log.log import Log, open_log
+from stsem.log.plan import NEEDS
 from stsem.replay.build import build_model, truth_frames
 from stsem.replay.engine import can_map, replay_log
 from stsem.replay.settings import validated
@@ -54,7 +55,7 @@ def test_the_same_outcomes(gappy_log: Log, made_up_costs: Path, settings: dict[s
     source = ProfileCosts(load_profile(made_up_costs), config.seed, gappy_log.info.sha256)
     costs: Callable[[object], CostSource] = lambda mode: source  # noqa: E731
     real = replay_log(gappy_log, config, model, costs, lambda done, total: None)
-    probe = Probe(gappy_log, config, costs, fused=fused, usable=truth_frames(gappy_log))
+    probe = Probe(gappy_log, config, costs, needs=model.needs(fused=fused), fused=fused, usable=truth_frames(gappy_log))
     for run in real.runs:
         assert run.real_time is not None
         assert shown(probe.attempt(run.mode, config.exact_rate)) == shown(run.real_time.results)
@@ -68,7 +69,7 @@ def test_patience(gappy_log: Log) -> None:
     costs: Callable[[object], CostSource] = lambda mode: ConstantCosts({"segment": 50 * MS})  # noqa: E731
     pending = []
     for patience in (0, 100 * MS, 10**10):
-        probe = Probe(gappy_log, config, costs, fused=False, usable=None, patience_ns=patience)
+        probe = Probe(gappy_log, config, costs, needs=frozenset(), fused=False, usable=None, patience_ns=patience)
         results = probe.attempt(mode, Fraction(10))
         assert len(results) == 16
         pending.append(sum(r.outcome is Outcome.PENDING for r in results))
@@ -79,7 +80,7 @@ def test_an_attempt_leaves_nothing_behind(gappy_log: Log, made_up_costs: Path) -
     """Rates may be tried in any order."""
     config = validated({"model": "oracle"})
     source = ProfileCosts(load_profile(made_up_costs), 0, gappy_log.info.sha256)
-    probe = Probe(gappy_log, config, lambda mode: source, fused=True, usable=truth_frames(gappy_log))
+    probe = Probe(gappy_log, config, lambda mode: source, needs=NEEDS, fused=True, usable=truth_frames(gappy_log))
     for mode in config.modes:
         first = shown(probe.attempt(mode, Fraction(1)))
         assert shown(probe.attempt(mode, Fraction(4))) != first

@@ -107,7 +107,8 @@ def identity_section(document: Document) -> Section:
     """Network, backend, versions, costs, configuration: what makes the bytes."""
     who = document.identity
     facts = {
-        "network": who.model, "network sha256": who.model_sha256, "sidecar sha256": who.sidecar_sha256,
+        "network": who.model, "inputs of the network": ", ".join(who.model_inputs),
+        "network sha256": who.model_sha256, "sidecar sha256": who.sidecar_sha256,
         "backend": who.backend, "precision": who.precision, "CPU features": " ".join(who.cpu_features),
         "costs": who.costs + (" (disturbed: measured while other work held a core)" if who.costs_disturbed else ""),
         "costs sha256": who.costs_sha256, "configuration hash": document.config_hash, "digest": document.digest,
