@@ -8,6 +8,7 @@ import numpy.typing as npt
 from stsem.camera import Camera
 from stsem.classes import Labels
 from stsem.pose import Pose
+from stsem.uncertainty import Uncertainty
 
 Image = npt.NDArray[np.uint8]
 Depth = npt.NDArray[np.float32]
@@ -49,7 +50,9 @@ class Segmentation:
     Args:
         labels: (H, W) uint8, NO_LABEL (255) where there is none.
         confidence: (H, W) float32 in 0..1, or None when the source states none.
+        uncertainty: maps (H, W) of the network that made the labels; None where it gives none, or none was made.
     """
 
     labels: Labels
     confidence: npt.NDArray[np.float32] | None = None
+    uncertainty: Uncertainty | None = None

@@ -1,9 +1,9 @@
 """Network outputs kept on disk: the same frame through the same network costs nothing the second time.
 
 Layout: `<root>/outputs/<key>/<stamp_ns>.seg`, one file per frame, beside an `about.json` that says what the key stands
-for. An entry is a header, the zlib-packed labels and confidence, and their checksum. It also holds a checksum of the
-pixels that went in, so that two cameras of one log under one stamp are never confused. Entries that do not fit are
-ignored and written anew.
+for. An entry is a header, the zlib-packed labels, confidence and maps of uncertainty, and their checksum. It also holds
+a checksum of the pixels that went in, so that two cameras of one log under one stamp are never confused. Entries that
+do not fit are ignored and written anew.
 """
 
 import hashlib
@@ -20,11 +20,13 @@ import platformdirs
 
 from stsem.errors import OutputError
 from stsem.frame import Frame, Segmentation
-from stsem.inference.inferencer import CONFIDENCE_STEPS, Identity, Inferencer, Output, segmentation
+from stsem.inference.inferencer import Identity, Inferencer, Output, segmentation
 from stsem.inference.network import Network
+from stsem.uncertainty import CONFIDENCE_STEPS, MEASURES, Uncertainty
 
-_MAGIC = b"stsem-o1"
-_HEADER = struct.Struct("<8sHHIII")  # magic, width, height, checksum of the input, of the payload, payload size
+_MAGIC = b"stsem-o2"
+_HEADER = struct.Struct("<8sHHBBIII")
+# magic, width, height, bits of the measures, classes behind them, checksum of the input, of the payload, payload size
 _LEVEL = 1
 
 
@@ -107,23 +109,30 @@ def checksum(frame: Frame, network: Network) -> int:
 def pack(output: Output, source: int) -> bytes:
     """Bytes of an entry."""
     height, width = output.labels.shape
-    payload = zlib.compress(output.labels.tobytes() + output.confidence.tobytes(), _LEVEL)
-    return _HEADER.pack(_MAGIC, width, height, source, zlib.crc32(payload), len(payload)) + payload
+    said = output.uncertainty
+    measures, classes, maps = (0, 0, b"") if said is None else (_bits(said), said.classes, said.levels.tobytes())
+    payload = zlib.compress(output.labels.tobytes() + output.confidence.tobytes() + maps, _LEVEL)
+    return _HEADER.pack(_MAGIC, width, height, measures, classes, source, zlib.crc32(payload), len(payload)) + payload
 
 
 def unpack(entry: bytes, source: int) -> Output | None:
     """Output from the bytes of `pack`; None when they are damaged or made from other pixels."""
     if len(entry) < _HEADER.size:
         return None
-    magic, width, height, made_from, crc, length = _HEADER.unpack_from(entry)
+    magic, width, height, bits, classes, made_from, crc, length = _HEADER.unpack_from(entry)
     payload = entry[_HEADER.size :]
     if (magic, made_from, length) != (_MAGIC, source, len(payload)) or zlib.crc32(payload) != crc:
         return None
     planes = np.frombuffer(zlib.decompress(payload), np.uint8)
-    if planes.size != 2 * width * height:
+    measures = tuple(measure for i, measure in enumerate(MEASURES) if bits >> i & 1)
+    if planes.size != (2 + len(measures)) * width * height:
         return None
-    labels, confidence = planes.reshape(2, height, width)
-    return Output(labels, confidence)
+    labels, confidence, *maps = planes.reshape(-1, height, width)
+    return Output(labels, confidence, Uncertainty(measures, np.stack(maps), classes) if maps else None)
+
+
+def _bits(uncertainty: Uncertainty) -> int:
+    return sum(1 << i for i, measure in enumerate(MEASURES) if measure in uncertainty.measures)
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,7 @@ from stsem.inference.backends import DEFAULT_BACKEND, DEFAULT_PRECISION, choose_
 from stsem.inference.cpu import cpu_features
 from stsem.inference.network import Network, OutputKind
 from stsem.inference.preprocess import labels_at, network_inputs
-
-CONFIDENCE_STEPS = 64
-"""Confidence is rounded to 1/64 before anybody sees it: exact in float32, and cheap to keep on disk."""
+from stsem.uncertainty import CONFIDENCE_STEPS, Uncertainty, ceiling, to_levels
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +25,12 @@ class Output:
     Args:
         labels: (h, w) uint8 in the network's ids; NO_LABEL is possible.
         confidence: (h, w) uint8, in steps of 1/CONFIDENCE_STEPS.
+        uncertainty: its maps (h, w); None when it gives none.
     """
 
     labels: Labels
     confidence: npt.NDArray[np.uint8]
+    uncertainty: Uncertainty | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Inferencer:
         self._session = row.open(network.path, threads)
 
     def infer(self, frame: Frame) -> Segmentation:
-        """Labels, in the network's ids, and confidence of `frame`, both at its image's size.
+        """Labels, in the network's ids, confidence and maps of uncertainty of `frame`, all at its image's size.
 
         Raises:
             NetworkError: the graph fails, or returns what cannot be labels and confidence.
@@ -79,13 +79,32 @@ class Inferencer:
     def compute(self, frame: Frame) -> Output:
         """The same at the network's size."""
         inputs = network_inputs(frame.image, frame.previous, self.network.sidecar, frame.depth)
+        measures = self.network.measures
         if self.network.output is OutputKind.LABELS:
-            labels, confidence = self._session.run(["labels", "confidence"], inputs)
-            return self._checked(labels[0], confidence[0])
-        (logits,) = self._session.run(["logits"], inputs)
-        return self._checked(*_argmax(logits[0], self.network.size))
+            labels, confidence, *maps = self._session.run(["labels", "confidence", *measures], inputs)
+            return self._checked(labels[0], confidence[0], self._uncertainty([found[0] for found in maps]))
+        logits, *maps = self._session.run(["logits", *measures], inputs)
+        labels, confidence = _argmax(logits[0], self.network.size)
+        return self._checked(labels, confidence, self._uncertainty([found[0] for found in maps]))
 
-    def _checked(self, labels: np.ndarray[Any, Any], confidence: np.ndarray[Any, Any]) -> Output:
+    def _uncertainty(self, maps: list[np.ndarray[Any, Any]]) -> Uncertainty | None:
+        """The maps (h, w) of the network's measures, rounded; None without any."""
+        measures, (width, height), classes = self.network.measures, self.network.size, len(self.network.classes)
+        if not measures:
+            return None
+        for measure, found in zip(measures, maps, strict=True):
+            low, high, top = float(found.min()), float(found.max()), ceiling(measure, classes)
+            if found.shape != (height, width) or not -1e-3 <= low <= high <= top + 1e-3:  # also false for NaN
+                raise NetworkError(
+                    f"The network {self.network.path.name} returned {measure!r} of shape {found.shape} from {low:g} to "
+                    f"{high:g}; expected shape ({height}, {width}) and, with {classes} classes, 0 to {top:.4g}."
+                )
+        levels = np.stack([to_levels(found, measure, classes) for measure, found in zip(measures, maps, strict=True)])
+        return Uncertainty(measures, levels, classes)
+
+    def _checked(
+        self, labels: np.ndarray[Any, Any], confidence: np.ndarray[Any, Any], uncertainty: Uncertainty | None
+    ) -> Output:
         name, (width, height), count = self.network.path.name, self.network.size, len(self.network.classes)
         if labels.shape != (height, width) or confidence.shape != (height, width):
             raise NetworkError(
@@ -100,13 +119,17 @@ class Inferencer:
         low, high = float(confidence.min()), float(confidence.max())
         if not -1e-3 <= low <= high <= 1 + 1e-3:  # also false for NaN
             raise NetworkError(f"The network {name} returned a confidence from {low:g} to {high:g}; expected 0 to 1.")
-        return Output(labels, np.rint(confidence.clip(0, 1) * CONFIDENCE_STEPS).astype(np.uint8))
+        steps = np.rint(confidence.clip(0, 1) * CONFIDENCE_STEPS).astype(np.uint8)
+        return Output(labels, steps, uncertainty)
 
 
 def segmentation(output: Output, size: tuple[int, int]) -> Segmentation:
-    """`output` at an image's size (width, height), by nearest neighbour, so that label and confidence stay together."""
+    """`output` at an image's size (width, height), by nearest neighbour, so that what belongs together stays so."""
     confidence = labels_at(output.confidence, size).astype(np.float32) / np.float32(CONFIDENCE_STEPS)
-    return Segmentation(labels_at(output.labels, size), confidence)
+    maps = output.uncertainty
+    if maps is not None:
+        maps = maps.each(lambda plane: labels_at(plane, size))
+    return Segmentation(labels_at(output.labels, size), confidence, maps)
 
 
 def _argmax(logits: npt.NDArray[np.float32], size: tuple[int, int]) -> tuple[Labels, npt.NDArray[np.float32]]:

@@ -9,6 +9,7 @@ from stsem.classes import ClassSet
 from stsem.errors import NetworkError
 from stsem.inference.backends import Port, Signature, read_signature
 from stsem.inference.sidecar import Sidecar, parse
+from stsem.uncertainty import MEASURES
 
 SHIPPED = Path(__file__).parent / "networks"
 DEFAULT = "default"
@@ -40,6 +41,7 @@ class Network:
         sidecar: size of the input, normalisation, classes, how difference and depth are formed.
         output: what the graph returns.
         model_sha256, sidecar_sha256: of the two files' bytes, hexadecimal.
+        measures: maps of uncertainty that it also returns, of MEASURES; each (1, H, W) float32.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Network:
     output: OutputKind
     model_sha256: str
     sidecar_sha256: str
+    measures: tuple[str, ...] = ()
 
     @property
     def sha256(self) -> str:
@@ -102,7 +105,7 @@ def load_network(path_or_name: str | Path) -> Network:
     _check_inputs(signature, sidecar, path)
     return Network(
         path.stem, path, sidecar, _output_kind(signature, sidecar, path),
-        hashlib.sha256(model).hexdigest(), hashlib.sha256(text).hexdigest(),
+        hashlib.sha256(model).hexdigest(), hashlib.sha256(text).hexdigest(), _measures(signature, sidecar, path),
     )  # fmt: skip
 
 
@@ -156,6 +159,15 @@ def _output_kind(signature: Signature, sidecar: Sidecar, path: Path) -> OutputKi
     raise NetworkError(
         f"The network {path} has the outputs {_listed(ports)}; expected 'labels' and 'confidence', or 'logits'."
     )
+
+
+def _measures(signature: Signature, sidecar: Sidecar, path: Path) -> tuple[str, ...]:
+    ports = {port.name: port for port in signature.outputs}
+    width, height = sidecar.size
+    found = tuple(measure for measure in MEASURES if measure in ports)
+    for measure in found:
+        _check_port(ports[measure], _FLOAT, (1, height, width), path)
+    return found
 
 
 def _check_port(port: Port, type_: str, shape: tuple[int | None, ...], path: Path) -> None:

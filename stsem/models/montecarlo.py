@@ -13,9 +13,10 @@ from torch import Tensor, nn
 from stsem import chance
 from stsem.errors import NetworkError
 from stsem.models.network import SegmentationNetwork, dropouts
+from stsem.uncertainty import MEASURES
 
 FEWEST_PASSES = 2
-MAPS = ("variance", "entropy", "mutual_information")
+MAPS = MEASURES
 
 
 class FixedDropout(nn.Module):

@@ -1,7 +1,7 @@
 """Segment: labels for a keyframe, from the network, from the truth as a perfect network, or from a fake."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import cv2
@@ -47,7 +47,7 @@ class NetworkSegmenter:
     def segment(self, frame: Frame) -> Segmentation:
         """The network's answer, translated."""
         answer = self.network.infer(frame)
-        return Segmentation(self.translation[answer.labels], answer.confidence)
+        return replace(answer, labels=self.translation[answer.labels])
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,17 @@ def _logits() -> onnx.ModelProto:
     )  # fmt: skip
 
 
+def _unsure() -> onnx.ModelProto:
+    """The strongest channel; two maps of uncertainty: red as the variance, blue as the mutual information."""
+    constants = [helper.make_node("Constant", [], [name], value=helper.make_tensor(name, TensorProto.INT64, [], [i]))
+                 for name, i in (("red", 0), ("blue", 2))]  # fmt: skip
+    return _model(
+        [_axes(), *constants, *_answer("image"), helper.make_node("Gather", ["image", "red"], ["variance"], axis=1),
+         helper.make_node("Gather", ["image", "blue"], ["mutual_information"], axis=1)],
+        ["image"], _LABELS | dict.fromkeys(("mutual_information", "variance"), _LABELS["confidence"]),
+    )  # fmt: skip
+
+
 def _wide_labels() -> onnx.ModelProto:
     """Labels as int64."""
     nodes = [_axes(), helper.make_node("ArgMax", ["image"], ["labels"], axis=1, keepdims=0), _answer("image")[2]]
@@ -134,6 +145,7 @@ GRAPHS: dict[str, Callable[[], onnx.ModelProto]] = {
     "difference": _difference,
     "depth": _depth,
     "logits": _logits,
+    "unsure": _unsure,
     "wide labels": _wide_labels,
     "other output": _other_output,
     "other input": _other_input,

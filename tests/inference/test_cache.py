@@ -112,7 +112,7 @@ def test_entries_keep_every_value(width: int, height: int, source: int) -> None:
 def test_arbitrary_bytes_are_no_entry(data: bytes) -> None:
     """Nothing but None comes from bytes that `pack` did not make."""
     assert unpack(data, 0) is None
-    assert unpack(b"stsem-o1" + data, 0) is None
+    assert unpack(b"stsem-o2" + data, 0) is None
 
 
 @pytest.mark.parametrize(("kind", "sections", "looks_at"), [

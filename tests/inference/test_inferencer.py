@@ -8,8 +8,9 @@ import pytest
 
 from stsem.errors import NetworkError, UsageError
 from stsem.frame import Frame, Image
-from stsem.inference.inferencer import CONFIDENCE_STEPS, Inferencer
+from stsem.inference.inferencer import Inferencer
 from stsem.inference.network import load_network
+from stsem.uncertainty import CONFIDENCE_STEPS
 
 Files = Callable[..., Path]
 SIDECAR = 'size = [16, 12]\nmean = [0.0, 0.0, 0.0]\nstd = [1.0, 1.0, 1.0]\nclasses = ["red", "green", "blue"]\n'
