@@ -1,9 +1,9 @@
-"""AdapNet++ and its fusion SSMA: colour alone, or colour and depth that weigh each other.
+"""AdapNet: ResNet-50 whose late units look at two distances at once, and a decoder of two transposed convolutions.
 
-Valada, Mohan and Burgard, Self-Supervised Model Adaptation for Multimodal Semantic Segmentation (2019), figures 2, 3, 5
-and 6. It is the successor, by the same authors, of Valada et al., AdapNet (2017), whose multiscale residual units it
-keeps; the 2017 network with its convoluted mixture of experts is not built. Depth comes as metres in one channel where
-the paper colours it.
+Valada et al., AdapNet: Adaptive Semantic Segmentation in Adverse Environmental Conditions (2017). It sees colour alone;
+its authors fuse trained networks of several modalities afterwards (CMoDE, which is not built). Colour and depth in one
+network are `stsem.models.adapnet_pp`. Layers are those of the authors' TensorFlow model (DeepSceneSeg/AdapNet), where
+every second dilation is 2; here they are the paper's, as ethz-asl/modular_semantic_segmentation has them, too.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from stsem.models.network import CHANNELS, Answers, SegmentationNetwork, SideAnswer, scaled, softmax
+from stsem.models.network import SegmentationNetwork, scaled, softmax
 from stsem.models.resnet import conv_bn
 
 UNITS: tuple[tuple[int, int, tuple[tuple[int, ...], ...]], ...] = (
@@ -22,202 +22,99 @@ UNITS: tuple[tuple[int, int, tuple[tuple[int, ...], ...]], ...] = (
 )
 """Stages res2 to res5: channels, stride, and the dilations of each unit; a multiscale unit has two."""
 EXPANSION = 4
-RATES = (3, 6, 12)
-"""Dilations of the efficient pyramid."""
-PYRAMID, BOTTLENECK, SKIP = 256, 64, 24
-SQUEEZE_PYRAMID, SQUEEZE_SKIP = 16, 6
-"""By how much an SSMA block narrows its features inside."""
-AUXILIARY = (0.6, 0.5)
-"""Weights of the losses at 1/8 and at 1/4 of the image's sides (section 3.1.3)."""
+FRONT = 3
+"""Channels of the 3x3 convolution at full size in front of ResNet's first one."""
+DROPOUT = 0.7
+"""Share dropped at the end of the last unit."""
 
 
-def conv_bn_relu(cin: int, cout: int, kernel: int, dilation: int = 1) -> nn.Sequential:
-    """Convolution, batch normalisation, ReLU."""
-    return nn.Sequential(*conv_bn(cin, cout, kernel, dilation=dilation), nn.ReLU(inplace=True))
+class MultiscaleConvolution(nn.ModuleList):
+    """A 3x3 convolution whose output channels are shared out over dilations; the first takes what is left over."""
 
-
-class Unit(nn.Module):
-    """Residual unit with full pre-activation; a multiscale one splits its 3x3 convolution over two dilations."""
-
-    def __init__(self, cin: int, channels: int, stride: int, dilations: Sequence[int]) -> None:
-        super().__init__()
-        cout = channels * EXPANSION
-        self.before = nn.Sequential(nn.BatchNorm2d(cin), nn.ReLU(inplace=True))
-        self.reduce = conv_bn_relu(cin, channels, 1)
+    def __init__(self, channels: int, stride: int, dilations: Sequence[int]) -> None:
         share = channels // len(dilations)
         shares = [channels - share * (len(dilations) - 1), *(share for _ in dilations[1:])]
-        self.scales = nn.ModuleList(
+        super().__init__(
             nn.Conv2d(channels, part, 3, stride, rate, rate, bias=False)
             for part, rate in zip(shares, dilations, strict=True)
         )
-        self.expand = nn.Sequential(
-            nn.BatchNorm2d(channels), nn.ReLU(inplace=True), nn.Conv2d(channels, cout, 1, bias=False)
-        )
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(B, channels, H, W) -> (B, channels, H / stride, W / stride)."""
+        return torch.cat([scale(x) for scale in self], 1)
+
+
+class Unit(nn.Module):
+    """Residual unit (He et al. 2015, figure 5 right), its stride on the first convolution."""
+
+    def __init__(self, cin: int, channels: int, stride: int, dilations: Sequence[int], dropout: float = 0.0) -> None:
+        super().__init__()
+        cout = channels * EXPANSION
+        self.body = nn.Sequential(
+            *conv_bn(cin, channels, 1, stride), nn.ReLU(inplace=True),
+            MultiscaleConvolution(channels, 1, dilations), nn.BatchNorm2d(channels), nn.ReLU(inplace=True),
+            *conv_bn(channels, cout, 1), *([nn.Dropout(dropout)] if dropout else []),
+        )  # fmt: skip
         unchanged = stride == 1 and cin == cout
-        self.shortcut = None if unchanged else nn.Conv2d(cin, cout, 1, stride, bias=False)
+        self.shortcut = nn.Identity() if unchanged else nn.Sequential(*conv_bn(cin, cout, 1, stride))
+        self.relu = nn.ReLU(inplace=True)
 
     def forward(self, x: Tensor) -> Tensor:
         """(B, cin, H, W) -> (B, 4 channels, H / stride, W / stride)."""
-        active = self.before(x)
-        reduced = self.reduce(active)
-        out: Tensor = self.expand(torch.cat([scale(reduced) for scale in self.scales], 1))
-        return out + (x if self.shortcut is None else self.shortcut(active))
-
-
-class EfficientPyramid(nn.Module):
-    """eASPP: a 1x1 convolution, three cascades of dilated ones in a bottleneck, and the mean of the image (figure 3).
-
-    The mean's branch has no batch normalisation: one value a channel has no statistics.
-    """
-
-    def __init__(self, cin: int, channels: int, bottleneck: int) -> None:
-        super().__init__()
-        self.point = conv_bn_relu(cin, channels, 1)
-        self.cascades = nn.ModuleList(
-            nn.Sequential(
-                conv_bn_relu(cin, bottleneck, 1), conv_bn_relu(bottleneck, bottleneck, 3, rate),
-                conv_bn_relu(bottleneck, bottleneck, 3, rate), conv_bn_relu(bottleneck, channels, 1),
-            )
-            for rate in RATES
-        )  # fmt: skip
-        self.mean = nn.Sequential(nn.Conv2d(cin, channels, 1), nn.ReLU(inplace=True))
-        self.join = conv_bn_relu((len(RATES) + 2) * channels, channels, 1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """(B, cin, h, w) -> (B, channels, h, w)."""
-        mean = self.mean(x.mean((2, 3), keepdim=True)).expand(-1, -1, *x.shape[-2:])
-        out: Tensor = self.join(torch.cat([self.point(x), *(cascade(x) for cascade in self.cascades), mean], 1))
-        return out
-
-
-class Encoder(nn.Module):
-    """ResNet-50 of pre-activated units at 1/16 of the image's sides, with the pyramid behind it (figure 2, left)."""
-
-    def __init__(self, cin: int, width: float) -> None:
-        super().__init__()
-        stem = scaled(64, width)
-        self.stem = nn.Sequential(*conv_bn(cin, stem, 7, 2), nn.ReLU(inplace=True), nn.MaxPool2d(3, 2, 1))
-        stages, skips, last = [], [], stem
-        for full, stride, dilations in UNITS:
-            channels = scaled(full, width)
-            units = [Unit(last, channels, stride, dilations[0])]
-            last = channels * EXPANSION
-            stages.append(nn.Sequential(*units, *(Unit(last, channels, 1, rates) for rates in dilations[1:])))
-            skips.append(last)
-        self.fine, self.middle, self.coarse = stages[0], stages[1], nn.Sequential(*stages[2:])
-        self.after = nn.Sequential(nn.BatchNorm2d(last), nn.ReLU(inplace=True))
-        self.pyramid = EfficientPyramid(last, scaled(PYRAMID, width), scaled(BOTTLENECK, width))
-        self.skip_fine, self.skip_middle = (conv_bn_relu(n, scaled(SKIP, width), 1) for n in skips[:2])
-
-    def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(B, cin, H, W) -> features at 1/16, and skips at 1/8 and 1/4 of the sides, rounded up."""
-        fine = self.fine(self.stem(x))
-        middle = self.middle(fine)
-        return self.pyramid(self.after(self.coarse(middle))), self.skip_middle(middle), self.skip_fine(fine)
-
-
-class Refine(nn.Module):
-    """A stage of the decoder: twice as large, then joined with a skip (figure 2, right).
-
-    Args:
-        channels: of the features, skip: of the skip.
-        correlate: weigh the skip's channels by the mean of the features first, as behind SSMA (figure 6).
-    """
-
-    def __init__(self, channels: int, skip: int, *, correlate: bool) -> None:
-        super().__init__()
-        self.enlarge = nn.Sequential(
-            nn.ConvTranspose2d(channels, channels, 4, 2, 1, bias=False), nn.BatchNorm2d(channels), nn.ReLU(inplace=True)
-        )
-        self.correlate = nn.Sequential(nn.Conv2d(channels, skip, 1), nn.ReLU(inplace=True)) if correlate else None
-        self.join = nn.Sequential(conv_bn_relu(channels + skip, channels, 3), conv_bn_relu(channels, channels, 3))
-
-    def forward(self, x: Tensor, skip: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, channels, h / 2, w / 2) and (B, skip, h, w) -> the enlarged and the joined, (B, channels, h, w)."""
-        large = cropped(self.enlarge(x), skip)
-        if self.correlate is not None:
-            skip = skip * self.correlate(large.mean((2, 3), keepdim=True))
-        return large, self.join(torch.cat([large, skip], 1))
-
-
-def cropped(x: Tensor, like: Tensor) -> Tensor:
-    """Without the last row and column where an odd side was rounded up before."""
-    return x[..., : like.shape[-2], : like.shape[-1]]
-
-
-class Decoder(nn.Module):
-    """Two refinements, and a transposed convolution to the image's size (section 3.1.3)."""
-
-    def __init__(self, classes: int, width: float, *, correlate: bool) -> None:
-        super().__init__()
-        channels, skip = scaled(PYRAMID, width), scaled(SKIP, width)
-        self.middle = Refine(channels, skip, correlate=correlate)
-        self.fine = Refine(channels, skip, correlate=correlate)
-        self.score = nn.Conv2d(channels, classes, 1)
-        self.enlarge = nn.ConvTranspose2d(classes, classes, 8, 4, 2)
-        self.auxiliary = nn.ModuleList(nn.Conv2d(channels, classes, 1) for _ in AUXILIARY)
-
-    def forward(self, coarse: Tensor, middle: Tensor, fine: Tensor, image: Tensor) -> tuple[Tensor, tuple[Tensor, ...]]:
-        """What `Encoder` gives, and the image for its size -> logits (B, C, H, W), and the two enlarged features."""
-        first, x = self.middle(coarse, middle)
-        second, x = self.fine(x, fine)
-        return cropped(self.enlarge(self.score(x)), image), (first, second)
-
-
-class SSMA(nn.Module):
-    """Self-supervised model adaptation: each modality's features are weighed in the light of both (figure 5)."""
-
-    def __init__(self, channels: int, squeeze: int) -> None:
-        super().__init__()
-        both, inner = 2 * channels, max(1, 2 * channels // squeeze)
-        self.gate = nn.Sequential(
-            nn.Conv2d(both, inner, 3, padding=1), nn.ReLU(inplace=True), nn.Conv2d(inner, both, 3, padding=1)
-        )
-        self.join = nn.Sequential(*conv_bn(both, channels, 3))
-
-    def forward(self, colour: Tensor, depth: Tensor) -> Tensor:
-        """Two (B, channels, h, w) -> one."""
-        both = torch.cat([colour, depth], 1)
-        out: Tensor = self.join(both * torch.sigmoid(self.gate(both)))
+        out: Tensor = self.relu(self.body(x) + self.shortcut(x))
         return out
 
 
 class AdapNet(SegmentationNetwork):
-    """AdapNet++; with two inputs, two encoders, three SSMA blocks and one decoder.
+    """AdapNet for colour.
 
     Args:
         classes: number of classes C.
-        width: factor on the numbers of channels.
-        inputs: ("image",) or ("image", "depth").
+        width: factor on the numbers of channels of the encoder.
     """
 
-    def __init__(self, classes: int, width: float = 1.0, *, inputs: tuple[str, ...] = ("image",)) -> None:
+    def __init__(self, classes: int, width: float = 1.0) -> None:
         super().__init__()
-        self.inputs = inputs
-        self.encoders = nn.ModuleDict({name: Encoder(CHANNELS[name], width) for name in inputs})
-        fused = len(inputs) > 1
-        pyramid, skip = scaled(PYRAMID, width), scaled(SKIP, width)
-        widths = ((pyramid, SQUEEZE_PYRAMID), (skip, SQUEEZE_SKIP), (skip, SQUEEZE_SKIP))
-        self.fusions = nn.ModuleList(SSMA(*row) for row in widths) if fused else None
-        self.decoder = Decoder(classes, width, correlate=fused)
-
-    def _decoded(self, *inputs: Tensor) -> tuple[Tensor, tuple[Tensor, ...]]:
-        levels = zip(*(self.encoders[name](x) for name, x in zip(self.inputs, inputs, strict=True)), strict=True)
-        if self.fusions is None:
-            return self.decoder(*(level for (level,) in levels), inputs[0])  # type: ignore[no-any-return]
-        fused = (fusion(*level) for fusion, level in zip(self.fusions, levels, strict=True))
-        return self.decoder(*fused, inputs[0])  # type: ignore[no-any-return]
+        last = scaled(64, width)
+        self.stem = nn.Sequential(
+            *conv_bn(3, FRONT, 3), nn.ReLU(inplace=True),
+            *conv_bn(FRONT, last, 7, 2), nn.ReLU(inplace=True), nn.MaxPool2d(3, 2, 1),
+        )  # fmt: skip
+        stages, outputs = [], []
+        for full, stride, dilations in UNITS:
+            channels = scaled(full, width)
+            units = [Unit(last, channels, stride, dilations[0])]
+            last = channels * EXPANSION
+            units += [Unit(last, channels, 1, rates) for rates in dilations[1:]]
+            stages.append(units)
+            outputs.append(last)
+        stages[-1][-1] = Unit(last, channels, 1, dilations[-1], DROPOUT)
+        self.fine, self.coarse = nn.Sequential(*stages[0], *stages[1]), nn.Sequential(*stages[2], *stages[3][:-1])
+        self.last = stages[3][-1]
+        self.skip = nn.Sequential(*conv_bn(outputs[1], 2 * classes, 1))
+        self.score = nn.Sequential(*conv_bn(last, classes, 1))
+        self.enlarge = _enlarging(classes, 2 * classes, 2)
+        self.enlarge_fused = _enlarging(2 * classes, classes, 8)
 
     def features(self, *inputs: Tensor) -> tuple[Tensor, ...]:
-        """The logits: there is no dropout."""
-        return (self._decoded(*inputs)[0],)
+        """Image (B, 3, H, W) -> the last unit's input at 1/16, the skip at 1/8, and a map of the image's size."""
+        (image,) = inputs
+        fine = self.fine(self.stem(image))
+        return self.coarse(fine), self.skip(fine), image[:, :1]
 
     def head(self, *features: Tensor) -> Tensor:
         """Probabilities (B, C, H, W) at the image's size."""
-        return softmax(*features)
+        coarse, skip, canvas = features
+        scores = cropped(self.enlarge(self.score(self.last(coarse))), skip) + skip
+        return softmax(cropped(self.enlarge_fused(scores), canvas))
 
-    def answers(self, *inputs: Tensor) -> Answers:
-        """With the decoder's two auxiliary classifiers."""
-        logits, enlarged = self._decoded(*inputs)
-        sides = zip(self.decoder.auxiliary, enlarged, AUXILIARY, strict=True)
-        return Answers(softmax(logits), tuple(SideAnswer(head(x), weight) for head, x, weight in sides))
+
+def cropped(x: Tensor, like: Tensor) -> Tensor:
+    """Without the last rows and columns where odd sides were rounded up before."""
+    return x[..., : like.shape[-2], : like.shape[-1]]
+
+
+def _enlarging(cin: int, cout: int, factor: int) -> nn.Sequential:
+    """A transposed convolution (B, cin, h, w) -> (B, cout, h factor, w factor)."""
+    layer = nn.ConvTranspose2d(cin, cout, 2 * factor, factor, factor // 2, bias=False)
+    return nn.Sequential(layer, nn.BatchNorm2d(cout))

@@ -11,6 +11,7 @@ from functools import partial
 
 from stsem.errors import UsageError
 from stsem.models.adapnet import AdapNet
+from stsem.models.adapnet_pp import AdapNetPP
 from stsem.models.bayesian_segnet import BayesianSegNet
 from stsem.models.crf_rnn import CRFRNN
 from stsem.models.deeplab import DeepLab
@@ -55,6 +56,9 @@ _PARSENET = Paper("Liu et al. 2015", "ParseNet: Looking Wider to See Better", "f
 _BAYESIAN = Paper("Kendall et al. 2015", "Bayesian SegNet", "figure 2")
 _DEEPLAB = Paper("Chen et al. 2016", "DeepLab: Semantic Image Segmentation with Deep Convolutional Nets", "figure 7")
 _CRF_RNN = Paper("Zheng et al. 2015", "Conditional Random Fields as Recurrent Neural Networks", "algorithm 1")
+_ADAPNET = Paper(
+    "Valada et al. 2017", "AdapNet: Adaptive Semantic Segmentation in Adverse Environmental Conditions", "section III"
+)
 _FUSENET = Paper("Hazirbas et al. 2016", "FuseNet: Incorporating Depth into Semantic Segmentation", "figure 2")
 
 
@@ -62,7 +66,7 @@ def _segnet(where: str) -> Paper:
     return Paper("Badrinarayanan et al. 2015", "SegNet: A Deep Convolutional Encoder-Decoder Architecture", where)
 
 
-def _adapnet(where: str) -> Paper:
+def _adapnet_pp(where: str) -> Paper:
     return Paper("Valada et al. 2019", "Self-Supervised Model Adaptation for Multimodal Semantic Segmentation", where)
 
 
@@ -110,8 +114,9 @@ ZOO: dict[str, Row] = {
     "deeplab-v2-crf": Row(_DEEPLAB, partial(DeepLab, crf=True)),
     "crf-rnn": Row(_CRF_RNN, CRFRNN),
     "fusenet": Row(_FUSENET, FuseNet),
-    "adapnet-pp": Row(_adapnet("figure 2"), AdapNet),
-    "adapnet-pp-ssma": Row(_adapnet("figures 2 and 5"), partial(AdapNet, inputs=("image", "depth"))),
+    "adapnet": Row(_ADAPNET, AdapNet),
+    "adapnet-pp": Row(_adapnet_pp("figure 2"), AdapNetPP),
+    "adapnet-pp-ssma": Row(_adapnet_pp("figures 2 and 5"), partial(AdapNetPP, inputs=("image", "depth"))),
 }  # fmt: skip
 ALIASES = {f"pspnet-r{depth}": f"pspnet-r{depth}-sum" for depth in (18, 50, 101)}
 """The paper's best fusion needs no name."""

@@ -1,102 +1,62 @@
-"""AdapNet++ and SSMA: counts beside the published ones, grids, units, gates."""
+"""AdapNet: a count by hand, grids, units that look at two distances."""
 
 import pytest
 
 torch = pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
-from stsem.models.adapnet import SSMA, AdapNet, EfficientPyramid, Encoder, Refine, Unit
-from stsem.models.cost import cost_of
+from stsem.models.adapnet import AdapNet, MultiscaleConvolution, Unit
 
 pytestmark = pytest.mark.torch
-BOTH = ("image", "depth")
-ODD = (67, 97)
+RESNET_50, ITS_CLASSIFIER = 25_557_032, 2048 * 1000 + 1000
+"""torchvision's count."""
 
 
 def _parameters(module: torch.nn.Module) -> int:
     return sum(p.numel() for p in module.parameters())
 
 
-def test_adapnet_has_the_published_size() -> None:
-    """12 classes of Cityscapes: 30.20 M in the paper, 30.15 M here; the paper leaves biases and kernels of transposed
-    convolutions open."""
+@pytest.mark.parametrize("classes", [2, 12])
+def test_adapnet_is_a_resnet50_and_little_more(classes: int) -> None:
+    """Two distances cost no weights; the front convolution, two scores and two transposed convolutions do."""
     with torch.device("meta"):
-        found = cost_of(AdapNet(12), 96)
-    assert found.parameters + found.auxiliary == pytest.approx(30.20e6, rel=0.002)
+        network = AdapNet(classes)
+    front = 3 * 3 * 9 + 2 * 3
+    skip, score = (512 + 2) * 2 * classes, (2048 + 2) * classes
+    first, second = 16 * classes * 2 * classes + 2 * 2 * classes, 256 * 2 * classes * classes + 2 * classes
+    assert _parameters(network) == RESNET_50 - ITS_CLASSIFIER + front + skip + score + first + second
 
 
-def test_ssma_costs_a_second_encoder_and_its_gates() -> None:
-    """56.44 M in the paper, 57.2 M here. The second encoder explains 25.6 M of the difference to AdapNet++ (one channel
-    instead of three), which leaves the paper's fusion 0.7 M; 3x3 convolutions as in figure 5 take 1.5 M."""
-    with torch.device("meta"):
-        one, two = AdapNet(12), AdapNet(12, inputs=BOTH)
-    encoder, fusion = _parameters(one.encoders), _parameters(two.fusions)
-    correlation = 2 * (256 + 1) * 24
-    assert _parameters(two) - _parameters(one) == encoder - 2 * 64 * 49 + fusion + correlation
-    assert fusion == pytest.approx(1.5e6, rel=0.01)
-    assert _parameters(two) == pytest.approx(56.44e6, rel=0.015)
+def test_a_unit_looks_at_two_distances() -> None:
+    """The answer to one bright pixel, with all weights 1: half of the channels see it 2 away, the others 5 away."""
+    layer = MultiscaleConvolution(2, 1, (2, 5))
+    for scale in layer:
+        torch.nn.init.ones_(scale.weight)
+    x = torch.zeros(1, 2, 15, 15)
+    x[0, 0, 7, 7] = 1
+    with torch.no_grad():
+        near, far = layer(x)[0]
+    for seen, rate in ((near, 2), (far, 5)):
+        expected = torch.zeros(15, 15)
+        expected[7 - rate : 8 + rate : rate, 7 - rate : 8 + rate : rate] = 1
+        assert torch.equal(seen, expected)
 
 
-def test_the_pyramid_has_the_published_size() -> None:
-    """eASPP: 2.04 M where DeepLab's pyramid of the same reach has more than ten times (abstract and section 3.1.2)."""
-    assert _parameters(EfficientPyramid(2048, 256, 64)) == pytest.approx(2.04e6, rel=0.005)
-
-
-def test_two_dilations_cost_no_weights() -> None:
-    """Halves of the channels look at either distance; an odd channel goes to the first."""
+def test_two_distances_cost_no_weights() -> None:
+    """An odd channel goes to the first."""
     assert _parameters(Unit(32, 8, 1, (2, 16))) == _parameters(Unit(32, 8, 1, (1,)))
-    unit = Unit(36, 9, 1, (2, 16))
-    assert [(scale.out_channels, scale.dilation) for scale in unit.scales] == [(5, (2, 2)), (4, (16, 16))]
-    assert unit.shortcut is None
-    assert unit(torch.zeros(1, 36, 5, 7)).shape == (1, 36, 5, 7)
+    layer = MultiscaleConvolution(9, 1, (2, 16))
+    assert [(scale.out_channels, scale.dilation) for scale in layer] == [(5, (2, 2)), (4, (16, 16))]
 
 
-@pytest.mark.parametrize("size", [ODD, (64, 96), (1, 1)])
+@pytest.mark.parametrize("size", [(67, 97), (64, 96), (1, 1)])
 def test_grids(size: tuple[int, int]) -> None:
-    """A sixteenth, an eighth and a quarter of the sides, rounded up; the answer has the image's own."""
-    network = AdapNet(3, 1 / 16, inputs=BOTH).eval()
-    image, depth = torch.zeros(1, 3, *size), torch.zeros(1, 1, *size)
+    """A sixteenth and an eighth of the sides, rounded up; the answer has the image's own."""
+    network = AdapNet(3, 1 / 16).eval()
+    image = torch.zeros(1, 3, *size)
     with torch.no_grad():
-        levels = network.encoders["depth"](depth)
-        answers = network.answers(image, depth)
-    assert [tuple(x.shape[-2:]) for x in levels] == [tuple(-(-side // s) for side in size) for s in (16, 8, 4)]
-    assert [tuple(x.logits.shape[-2:]) for x in answers.sides] == [
-        tuple(-(-side // s) for side in size) for s in (8, 4)
-    ]
-    assert [side.weight for side in answers.sides] == [0.6, 0.5]
-    assert answers.probabilities.shape == (1, 3, *size)
-
-
-def test_a_gate_chooses_between_modalities() -> None:
-    """Half of either where it knows nothing; wide open for one and shut for the other, the other does not matter."""
-    torch.manual_seed(0)
-    fusion = SSMA(8, 2).eval()
-    last = fusion.gate[-1]
-    last.weight.data.zero_()
-    last.bias.data.zero_()
-    colour, depth, other = torch.randn(3, 1, 8, 5, 7)
-    with torch.no_grad():
-        assert torch.allclose(fusion(colour, depth), fusion.join(torch.cat([colour, depth], 1) / 2), atol=1e-6)
-        assert not torch.allclose(fusion(colour, depth), fusion(colour, other), atol=1e-3)
-        last.bias[:8], last.bias[8:] = 100, -100
-        assert torch.allclose(fusion(colour, depth), fusion(colour, other), atol=1e-6)
-        assert not torch.allclose(fusion(colour, depth), fusion(other, depth), atol=1e-3)
-
-
-def test_skips_are_weighed_by_what_the_decoder_knows() -> None:
-    """Only behind SSMA: where the mean of the features says nothing, the skip is left out."""
-    torch.manual_seed(0)
-    x, skips = torch.randn(1, 8, 3, 4), torch.randn(2, 1, 4, 6, 8)
-    for correlate in (False, True):
-        stage = Refine(8, 4, correlate=correlate).eval()
-        if stage.correlate is not None:
-            torch.nn.init.zeros_(stage.correlate[0].weight)
-            torch.nn.init.zeros_(stage.correlate[0].bias)
-        with torch.no_grad():
-            (large, one), (_, two) = (stage(x, skip) for skip in skips)
-        assert large.shape == (1, 8, 6, 8)
-        assert torch.equal(one, two) == correlate
-
-
-def test_depth_has_one_channel() -> None:
-    """Metres, not a coloured image."""
-    assert next(Encoder(1, 1 / 16).parameters()).shape[1] == 1
+        coarse, skip, canvas = network.features(image)
+        answer = network(image)
+    assert tuple(coarse.shape[-2:]) == tuple(-(-side // 16) for side in size)
+    assert tuple(skip.shape[-2:]) == tuple(-(-side // 8) for side in size)
+    assert canvas.shape[-2:] == answer.shape[-2:] == size
+    assert network.stochastic
