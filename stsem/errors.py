@@ -9,6 +9,7 @@
     |-- ClassTableError        1   the class names of a log, a file or a network
     |-- NetworkError           1   an ONNX file, its sidecar, or what it returns
     |-- TrainingError          1   training pairs or a checkpoint
+    |   `-- TrainingStoppedError 130 a training was stopped in order, and can go on
     |-- ConversionError        1   a data set that cannot become a log
     |-- CostError              1   a cost profile
     |-- OutputError            1   a folder or file that cannot be written
@@ -27,6 +28,7 @@ EXIT_USAGE = 2
 EXIT_LOSSY = 3
 EXIT_GATE_FAILED = 4
 EXIT_NOTHING_MEASURED = 5
+EXIT_STOPPED = 130
 
 
 class StsemError(Exception):
@@ -90,6 +92,12 @@ class NetworkError(StsemError):
 
 class TrainingError(StsemError):
     """Training pairs or a checkpoint that cannot be used."""
+
+
+class TrainingStoppedError(TrainingError):
+    """A training was stopped in order; the same command goes on."""
+
+    exit_code = EXIT_STOPPED
 
 
 class ConversionError(StsemError):

@@ -183,7 +183,12 @@ def copy_colour_to_difference(
     except RuntimeError as err:
         raise NetworkError("The difference stream cannot start from the colour stream, whose width is another one; "
                            "build both of one width.") from err  # fmt: skip
-    stem = network.difference.backbone.stem
+    adapt_to_difference(network.difference, std=std, scale=scale)
+
+
+def adapt_to_difference(stream: PSPNet, *, std: tuple[float, float, float], scale: float) -> None:
+    """Make a stream that has a colour stream's weights one for differences, in place; see `copy_colour_to_difference`."""
+    stem = stream.backbone.stem
     with torch.no_grad():
         stem.get_parameter("0.weight").div_(torch.tensor(std).reshape(1, 3, 1, 1) * scale)
     first = stem[1]

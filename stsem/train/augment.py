@@ -1,6 +1,7 @@
 """Random views of a training pair: which frame is current, scale, place, mirror, light, noise."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -8,8 +9,10 @@ import numpy.typing as npt
 
 from stsem.classes import NO_LABEL
 from stsem.train.dataset import Pair
+from stsem.train.recipe import Recipe
 
 Image = npt.NDArray[np.uint8]
+Colour = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
@@ -19,38 +22,64 @@ class Augmentation:
     Args:
         crop: (width, height) of what the network sees.
         scales: smallest and largest width of the whole image, as a multiple of the crop's width.
+        of_image: `scales` are multiples of the image's own width.
+        stretch: largest logarithm of the change of aspect.
+        mirror: half of the views are mirrored.
+        light: photometric changes.
         still: share of samples whose previous frame is the current one (a robot that stands), up to noise.
-        plain: no photometric change and no mirror: for the last part of a training.
+        fill: RGB of what lies beyond the image.
     """
 
     crop: tuple[int, int]
     scales: tuple[float, float] = (1.0, 2.0)
+    of_image: bool = False
+    stretch: float = 0.1
+    mirror: bool = True
+    light: bool = True
     still: float = 0.05
-    plain: bool = False
+    fill: Colour = (0, 0, 0)
+
+    @classmethod
+    def of(cls, recipe: Recipe, mean: tuple[float, float, float]) -> "Augmentation":
+        """As a recipe says; beyond the image lies `mean` (RGB in 0..1), which a network sees as zero."""
+        red, green, blue = (round(255 * part) for part in mean)
+        return cls(
+            recipe.crop, recipe.scales, recipe.of_image, recipe.stretch, recipe.mirror, recipe.light, recipe.still,
+            (red, green, blue),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What a network is trained on: `current`, `previous` (H, W, 3) uint8 RGB and `labels` (H, W) of `current`."""
+    """What a network is trained on.
+
+    Args:
+        current, previous: (H, W, 3) uint8 RGB.
+        labels: (H, W) uint8 of `current`.
+        depth: (H, W) float32 metres of `current`, NaN unknown; None where the pair has none.
+    """
 
     current: Image
     previous: Image
     labels: npt.NDArray[np.uint8]
+    depth: npt.NDArray[np.float32] | None = None
 
 
 def view(pair: Pair, how: Augmentation, rng: np.random.Generator) -> View:
     """A random view of `pair`, drawn from `rng` alone."""
-    now = int(rng.integers(2))
+    usable = pair.labelled or (0, 1)
+    now = usable[int(rng.integers(len(usable)))]
     before = now if rng.random() < how.still else 1 - now
     box = _random_box(pair.labels.shape[2], pair.labels.shape[1], how, rng)
-    current, previous = (_cut(pair.images[i], box, how.crop) for i in (now, before))
-    labels = _cut(pair.labels[now], box, how.crop, labels=True)
-    if how.plain:
-        return View(current, previous, labels)
-    current, previous = _relit(current, previous, rng)
-    if rng.random() < 0.5:
-        return View(*(np.ascontiguousarray(part[:, ::-1]) for part in (current, previous, labels)))
-    return View(current, previous, labels)
+    current, previous = (_cut(pair.images[i], box, how.crop, how.fill) for i in (now, before))
+    labels = _cut(pair.labels[now], box, how.crop, NO_LABEL, nearest=True)
+    depth = None if pair.depths is None else _cut(pair.depths[now], box, how.crop, float("nan"), nearest=True)
+    if how.light:
+        current, previous = _relit(current, previous, rng)
+    if how.mirror and rng.random() < 0.5:
+        current, previous, labels = (np.ascontiguousarray(part[:, ::-1]) for part in (current, previous, labels))
+        depth = None if depth is None else np.ascontiguousarray(depth[:, ::-1])
+    return View(current, previous, labels, depth)
 
 
 Box = tuple[float, float, float, float]
@@ -58,26 +87,23 @@ Box = tuple[float, float, float, float]
 
 
 def _random_box(width: int, height: int, how: Augmentation, rng: np.random.Generator) -> Box:
-    """Log-uniform scale, aspect of the crop up to a tenth, anywhere that keeps it inside as far as it fits."""
+    """Log-uniform scale, aspect of the crop up to `stretch`, anywhere that keeps it inside as far as it fits."""
     scale = float(np.exp(rng.uniform(*np.log(how.scales))))
-    stretch = float(np.exp(rng.uniform(-0.1, 0.1))) if not how.plain else 1.0
-    box_width = width / scale
+    stretch = float(np.exp(rng.uniform(-how.stretch, how.stretch))) if how.stretch else 1.0
+    box_width = (how.crop[0] if how.of_image else width) / scale
     box_height = box_width * how.crop[1] / how.crop[0] * stretch
-    if how.plain and scale == 1.0:
-        box_height = float(height)
     left, top = (rng.uniform(min(0.0, side - part), max(0.0, side - part))
                  for side, part in ((width, box_width), (height, box_height)))  # fmt: skip
     return float(left), float(top), box_width, box_height
 
 
-def _cut(image: Image, box: Box, size: tuple[int, int], *, labels: bool = False) -> Image:
-    """The part of `image` under `box`, at `size`; black or NO_LABEL where the box leaves the image."""
+def _cut(image: Any, box: Box, size: tuple[int, int], fill: Colour | float, *, nearest: bool = False) -> Any:
+    """The part of `image` under `box`, at `size`; `fill` where the box leaves the image."""
     left, top, width, height = box
     sx, sy = size[0] / width, size[1] / height
     matrix = np.array([[sx, 0, (0.5 - left) * sx - 0.5], [0, sy, (0.5 - top) * sy - 0.5]], np.float64)
-    border, flags = (NO_LABEL, cv2.INTER_NEAREST) if labels else ((0, 0, 0), cv2.INTER_LINEAR)
-    return np.asarray(cv2.warpAffine(image, matrix, size, flags=flags, borderMode=cv2.BORDER_CONSTANT,
-                                     borderValue=border), np.uint8)  # fmt: skip
+    flags = cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR
+    return cv2.warpAffine(image, matrix, size, flags=flags, borderMode=cv2.BORDER_CONSTANT, borderValue=fill)
 
 
 def _relit(current: Image, previous: Image, rng: np.random.Generator) -> tuple[Image, Image]:

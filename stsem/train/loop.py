@@ -1,171 +1,167 @@
-"""The training loop: pairs in, checkpoints out. Any iteration can be repeated: its draws are keyed by its number."""
+"""The training loop: pairs in, weights out. Any iteration can be repeated: its draws are keyed by its number."""
 
 import copy
-import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 import torch
+from torch import nn
+from torch.nn.modules.batchnorm import _BatchNorm
 from torch.optim.swa_utils import AveragedModel
 
 from stsem import chance
 from stsem.errors import TrainingError
-from stsem.inference.preprocess import difference_input, image_input
 from stsem.inference.sidecar import Sidecar
 from stsem.models.network import SegmentationNetwork
-from stsem.models.zoo import build
-from stsem.train.augment import Augmentation, View, view
-from stsem.train.dataset import PairFolder
+from stsem.train.augment import Augmentation, view
+from stsem.train.dataset import Pairs
+from stsem.train.dropout import begin_iteration, key_dropout
+from stsem.train.job import Machine
 from stsem.train.objective import Objective
+from stsem.train.recipe import Recipe
+from stsem.train.tensors import tensors
 
 Tensors = tuple[torch.Tensor, ...] | list[torch.Tensor]
-CLIP = 5.0
-"""Largest norm of the gradient of all weights together."""
 
 
-@dataclass(frozen=True)
-class Schedule:
-    """Numbers of a training.
+@dataclass
+class Record:
+    """What a training has seen.
 
     Args:
-        iterations, batch: how long, and how many views each.
-        rate: largest learning rate of AdamW; it falls as (1 - i / iterations) ** power (Zhao et al., section 5.1).
-        warm_up: iterations over which the rate rises from zero first.
-        power, decay: of the fall, and weight decay.
-        average: factor of the running mean of the weights, which is what gets published.
-        seed: of every draw.
-        workers: threads that each take an equal part of the batch through a replica of the network. On a busy machine
-            this beats threads inside the operators, which wait for each other at every one of them. With more than one,
-            their dropout masks interleave, so that a repeated iteration is alike but not equal.
-        checkpoint_every: iterations between checkpoints.
+        losses: mean loss of every iteration.
+        validations: iteration -> (mIoU, pixel accuracy) of the averaged weights.
     """
 
-    iterations: int
-    batch: int = 8
-    rate: float = 2e-3
-    warm_up: int = 200
-    power: float = 0.9
-    decay: float = 1e-2
-    average: float = 0.998
-    seed: int = 0
-    workers: int = 1
-    checkpoint_every: int = 200
-
-    def rate_at(self, iteration: int) -> float:
-        """Learning rate of an iteration, counted from 0."""
-        fall: float = (1 - iteration / self.iterations) ** self.power
-        return self.rate * min(1.0, (iteration + 1) / self.warm_up) * fall
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a training stands; `loss` is the mean since the last report."""
-
-    iteration: int
-    iterations: int
-    loss: float
-    rate: float
+    losses: list[float] = field(default_factory=list)
+    validations: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
 class Training:
     """A network in training.
 
     Args:
-        architecture: a name that `stsem.models.zoo.build` knows.
+        network: with the weights to begin with.
+        new: names of parameters that did not come from given weights; empty where none or all of them did.
         sidecar: how inputs are formed, and the classes.
-        objective: the loss.
-        how: random views.
-        schedule: numbers.
+        weights: (C,) class weights of the loss.
+        recipe: all numbers; of `iterations`, `batch` and `rate` those of this stage.
+        machine: what it runs on.
+        seed: of every draw.
+        frozen: batch normalisation keeps its statistics.
     """
 
     def __init__(
-        self, architecture: str, sidecar: Sidecar, objective: Objective, how: Augmentation, schedule: Schedule
-    ) -> None:
-        torch.manual_seed(chance.hash31(schedule.seed, "initial weights"))
-        self._architecture, self._sidecar, self._objective = architecture, sidecar, objective
-        self._how, self._schedule = how, schedule
-        self.network = build(architecture, len(sidecar.classes))
-        _check_inputs(architecture, self.network, sidecar)
-        self.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-        self._mean = AveragedModel(self.network, multi_avg_fn=_running_mean(schedule.average), use_buffers=True)
-        self._optimiser = torch.optim.AdamW(self.network.parameters(), schedule.rate, weight_decay=schedule.decay)
-        self._replicas = [self.network, *(_replica(self.network) for _ in range(schedule.workers - 1))]
-        self._pool = ThreadPoolExecutor(schedule.workers)
+        self, network: SegmentationNetwork, sidecar: Sidecar, weights: torch.Tensor, recipe: Recipe, machine: Machine,
+        *, seed: int, new: frozenset[str] = frozenset(), frozen: bool = False,
+    ) -> None:  # fmt: skip
+        self._recipe, self._sidecar, self._machine, self._seed, self._frozen = recipe, sidecar, machine, seed, frozen
+        self._objective = Objective(weights.to(machine.device), machine.bf16, recipe.fine)
+        self._how = Augmentation.of(recipe, sidecar.mean)
+        self.network = network.to(device=machine.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        key_dropout(self.network)
+        self._mean = AveragedModel(self.network, multi_avg_fn=_running_mean(recipe.average), use_buffers=True)
+        self._optimiser = _optimiser(self.network, recipe, new)
+        self._workers = _workers(recipe.batch, machine.workers, frozen=frozen)
+        self._replicas: list[SegmentationNetwork] = []
+        self._pool = ThreadPoolExecutor(self._workers, initializer=torch.set_num_threads, initargs=(machine.threads,))
         self.iteration = 0
+        self.record = Record()
 
-    def run(self, pairs: PairFolder, checkpoint: Path, report: Callable[[Progress], None], every: int = 20) -> None:
-        """Train to the end of the schedule, writing `checkpoint` on the way and at the end."""
-        losses: list[float] = []
-        while self.iteration < self._schedule.iterations:
-            losses.append(self._step(pairs))
-            self.iteration += 1
-            if self.iteration % every == 0:
-                rate = self._schedule.rate_at(self.iteration)
-                report(Progress(self.iteration, self._schedule.iterations, float(np.mean(losses)), rate))
-                losses.clear()
-            if self.iteration % self._schedule.checkpoint_every == 0 or self.iteration == self._schedule.iterations:
-                self.save(checkpoint)
+    @property
+    def averaged(self) -> SegmentationNetwork:
+        """The network with the running mean of the weights."""
+        network = self._mean.module
+        assert isinstance(network, SegmentationNetwork)
+        return network
 
-    def _step(self, pairs: PairFolder) -> float:
-        torch.manual_seed(chance.hash31(self._schedule.seed, "dropout", self.iteration))
+    def step(self, pairs: Pairs) -> float:
+        """One iteration; returns its loss."""
+        if not self._replicas:
+            self._replicas = [self.network, *(_replica(self.network) for _ in range(self._workers - 1))]
         for group in self._optimiser.param_groups:
-            group["lr"] = self._schedule.rate_at(self.iteration)
-        losses = list(self._pool.map(lambda worker: self._differentiate(worker, pairs), range(len(self._replicas))))
-        for first, *others in zip(*(replica.parameters() for replica in self._replicas), strict=True):
-            first.grad = sum((other.grad for other in others), start=first.grad)
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), CLIP)
+            group["lr"] = self._recipe.rate_at(self.iteration) * group["factor"]
+        losses = list(self._pool.map(lambda worker: self._differentiate(worker, pairs), range(self._workers)))
+        _gather(self._replicas)
+        if self._recipe.clip:
+            nn.utils.clip_grad_norm_(self.network.parameters(), self._recipe.clip)
         self._optimiser.step()
         self._mean.update_parameters(self.network)
-        return sum(losses)
+        loss = sum(losses)
+        if not torch.isfinite(torch.tensor(loss)):
+            raise TrainingError(f"The loss of iteration {self.iteration} is {loss}: the training diverges; "
+                                "begin anew with a smaller --rate.")  # fmt: skip
+        self.iteration += 1
+        self.record.losses.append(loss)
+        return loss
 
-    def _differentiate(self, worker: int, pairs: PairFolder) -> float:
-        """Gradients of one worker's part of the batch, in its replica."""
-        rng = chance.generator(self._schedule.seed, "batch", self.iteration, worker)
-        chosen = rng.integers(len(pairs), size=self._schedule.batch // len(self._replicas))
-        views = [view(pairs.pair(int(i)), self._how, rng) for i in chosen]
+    def _differentiate(self, worker: int, pairs: Pairs) -> float:
+        """Gradients of one worker's part of the batch, in its replica; its part of the mean loss."""
+        part = range(self._recipe.batch)[worker :: self._workers]
+        draws = [chance.generator(self._seed, "view", self.iteration, place) for place in part]
+        views = [view(pairs.pair(int(rng.integers(len(pairs)))), self._how, rng) for rng in draws]
         network = self._replicas[worker].train()
+        if self._frozen:
+            freeze_norm(network)
+        begin_iteration(network, self._seed, self.iteration, worker)
         network.zero_grad(set_to_none=True)
-        inputs, labels = tensors(views, self._sidecar)
-        loss = self._objective(network, [inputs[name] for name in network.inputs], labels) / len(self._replicas)
+        inputs, labels = tensors(views, self._sidecar, network.inputs, self._machine.device)
+        loss = self._objective(network, inputs, labels) * (len(views) / self._recipe.batch)
         loss.backward()  # type: ignore[no-untyped-call]
         return float(loss.detach())
 
-    def save(self, path: Path) -> None:
-        """Write everything that is needed to go on, aside and renamed."""
-        state = {
-            "architecture": self._architecture, "iteration": self.iteration, "schedule": asdict(self._schedule),
-            "network": self.network.state_dict(), "mean": self._mean.state_dict(),
-            "optimiser": self._optimiser.state_dict(),
+    def state(self) -> dict[str, Any]:
+        """Everything that is needed to go on, as tensors and plain values."""
+        validations = {str(iteration): list(scores) for iteration, scores in self.record.validations.items()}
+        return {
+            "iteration": self.iteration, "network": self.network.state_dict(), "mean": self._mean.state_dict(),
+            "optimiser": self._optimiser.state_dict(), "losses": list(self.record.losses), "validations": validations,
         }  # fmt: skip
-        aside = path.with_suffix(".part")
-        torch.save(state, aside)
-        aside.replace(path)
 
-    def resume(self, path: Path) -> None:
-        """Go on from a checkpoint of the same training, exactly as if it had not stopped.
-
-        Raises:
-            TrainingError: unreadable, or of another architecture or schedule.
-        """
-        state = read_checkpoint(path)
-        if (state["architecture"], state["schedule"]) != (self._architecture, asdict(self._schedule)):
-            raise TrainingError(
-                f"The checkpoint {path} is of another training ({state['architecture']}, {state['schedule']}); "
-                "give the same numbers, or start from its weights."
-            )
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from what `state` gave, exactly as if it had not stopped."""
         self.network.load_state_dict(state["network"])
         self._mean.load_state_dict(state["mean"])
         self._optimiser.load_state_dict(state["optimiser"])
         self.iteration = int(state["iteration"])
+        validations = {int(iteration): (scores[0], scores[1]) for iteration, scores in state["validations"].items()}
+        self.record = Record(list(state["losses"]), validations)
+        self._replicas = []
 
-    def start_from(self, path: Path) -> None:
-        """Begin with the averaged weights of a checkpoint of the same architecture. Raises TrainingError."""
-        self.network.load_state_dict(averaged_weights(read_checkpoint(path)))
-        self._mean.module.load_state_dict(self.network.state_dict())
+    def close(self) -> None:
+        """Let the workers go."""
+        self._pool.shutdown()
+
+
+def freeze_norm(network: nn.Module) -> None:
+    """Let batch normalisation use the statistics it has, in a network in training mode."""
+    for layer in network.modules():
+        if isinstance(layer, _BatchNorm):
+            layer.eval()
+
+
+def _workers(batch: int, wanted: int, *, frozen: bool) -> int:
+    """As many as wanted, but each must have a view, and two where batch normalisation needs to see a spread."""
+    least = 1 if frozen else 2
+    if batch < least:
+        raise TrainingError("Batches of one view have no spread for batch normalisation to learn from; give --batch 2 "
+                            "or more, or weights to begin with and freeze_norm = true in the recipe.")  # fmt: skip
+    return max(1, min(wanted, batch // least))
+
+
+def _optimiser(network: SegmentationNetwork, recipe: Recipe, new: frozenset[str]) -> torch.optim.Optimizer:
+    """Two groups: what was given, and what is new, whose rate is `new_layers` times as large."""
+    named = list(network.named_parameters())
+    groups = [
+        {"params": [p for name, p in named if (name in new) == is_new], "factor": recipe.new_layers if is_new else 1.0}
+        for is_new in (False, True)
+    ]
+    groups = [group for group in groups if group["params"]]
+    if recipe.optimiser == "sgd":
+        return torch.optim.SGD(groups, recipe.rate, momentum=recipe.momentum, weight_decay=recipe.decay)
+    return torch.optim.AdamW(groups, recipe.rate, weight_decay=recipe.decay)
 
 
 def _running_mean(factor: float) -> Callable[[Tensors, Tensors, torch.Tensor | int], None]:
@@ -174,7 +170,7 @@ def _running_mean(factor: float) -> Callable[[Tensors, Tensors, torch.Tensor | i
     def update(means: Tensors, values: Tensors, count: torch.Tensor | int) -> None:
         kept = min(factor, (1 + int(count)) / (10 + int(count)))
         for mean, value in zip(means, values, strict=True):
-            mean.lerp_(value, 1 - kept) if mean.is_floating_point() else mean.copy_(value)
+            mean.lerp_(value, 1 - kept) if kept and mean.is_floating_point() else mean.copy_(value)
 
     return update
 
@@ -187,34 +183,9 @@ def _replica(network: SegmentationNetwork) -> SegmentationNetwork:
     return twin
 
 
-def _check_inputs(architecture: str, network: SegmentationNetwork, sidecar: Sidecar) -> None:
-    known = {"image", "difference"} if sidecar.difference else {"image"}
-    for name in network.inputs:
-        if name not in known:
-            raise TrainingError(f"The architecture {architecture} takes {name!r}, which these pairs and sidecar do not "
-                                f"give ({', '.join(sorted(known))}); choose another one.")  # fmt: skip
-
-
-def tensors(views: list[View], sidecar: Sidecar) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
-    """Inputs by name (B, 3, H, W) and labels (B, H, W) int64, formed by the functions that inference uses."""
-    inputs = {"image": [image_input(v.current, sidecar) for v in views]}
-    if sidecar.difference:
-        inputs["difference"] = [difference_input(v.current, v.previous, sidecar.difference) for v in views]
-    stacked = {name: torch.from_numpy(np.stack(x)).to(memory_format=torch.channels_last) for name, x in inputs.items()}
-    return stacked, torch.from_numpy(np.stack([v.labels for v in views]).astype(np.int64))
-
-
-def read_checkpoint(path: Path) -> dict[str, Any]:
-    """A checkpoint's state; tensors and plain values only. Raises TrainingError."""
-    if not zipfile.is_zipfile(path):  # torch would ask for an unsafe way to read it
-        raise TrainingError(f"The checkpoint {path} is missing or damaged; give one that a training wrote.")
-    try:
-        state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, EOFError, ValueError) as err:
-        raise TrainingError(f"The checkpoint {path} cannot be read ({err}); give one that a training wrote.") from err
-    return state
-
-
-def averaged_weights(state: dict[str, Any]) -> dict[str, torch.Tensor]:
-    """The averaged weights in a checkpoint's state, as the network names them."""
-    return {key.removeprefix("module."): value for key, value in state["mean"].items() if key.startswith("module.")}
+def _gather(replicas: list[SegmentationNetwork]) -> None:
+    """Add the gradients of all replicas to the first one's, in their order; what no loss reaches keeps None."""
+    for first, *others in zip(*(replica.parameters() for replica in replicas), strict=True):
+        for other in others:
+            if other.grad is not None:
+                first.grad = other.grad if first.grad is None else first.grad + other.grad

@@ -12,15 +12,15 @@ from torch.nn import functional
 from stsem.classes import NO_LABEL
 from stsem.models.network import SegmentationNetwork, softmax
 
-BALANCE = 0.3
-"""Class weights are share ** -BALANCE, scaled so that the mean over pixels is 1: rare classes count somewhat more."""
-FINE = 2
-"""The loss is taken on every second pixel; with aligned corners these are grid points of the enlargement."""
+BALANCE, FINE = 0.3, 2
 
 
-def class_weights(shares: npt.NDArray[np.float64]) -> Tensor:
-    """(C,) float32 weights from the classes' shares of pixels; a class without pixels weighs nothing."""
-    weights = np.where(shares > 0, np.maximum(shares, 1e-4) ** -BALANCE, 0.0)
+def class_weights(shares: npt.NDArray[np.float64], balance: float = BALANCE) -> Tensor:
+    """(C,) float32 weights share ** -balance with a mean of 1 over the pixels; a class without pixels weighs nothing.
+
+    With `balance` 0 every pixel weighs 1.
+    """
+    weights = np.where(shares > 0, np.maximum(shares, 1e-4) ** -balance, 0.0)
     return torch.from_numpy((weights / (weights * shares).sum()).astype(np.float32))
 
 
@@ -29,18 +29,22 @@ class Objective:
     """The loss of a batch.
 
     Args:
-        weights: (C,) class weights.
+        weights: (C,) class weights, on the network's device.
         bf16: run the convolutions in bfloat16; the loss is float32 all the same.
+        fine: the loss is taken on every `fine`-th pixel; where that divides both sides less one, these are grid points
+            of the enlargement with aligned corners.
     """
 
     weights: Tensor
     bf16: bool = False
+    fine: int = FINE
 
     def __call__(self, network: SegmentationNetwork, inputs: Sequence[Tensor], labels: Tensor) -> Tensor:
         """Scalar loss of inputs (B, channels, H, W) as the network orders them, and labels (B, H, W) int64."""
-        with torch.autocast("cpu", torch.bfloat16, enabled=self.bf16):
+        # The cache of casts is one for all threads: without it a weight used twice gets its gradients in one order.
+        with torch.autocast(labels.device.type, torch.bfloat16, enabled=self.bf16, cache_enabled=False):
             answers = network.answers(*inputs)
-        fine = labels[:, ::FINE, ::FINE]
+        fine = labels[:, :: self.fine, :: self.fine]
         loss = self._of_probabilities(answers.probabilities, fine)
         for side in answers.sides:
             if side.enlarged:
@@ -54,7 +58,10 @@ class Objective:
         return self._entropy(_enlarged(probabilities, labels).clamp_min(1e-6).log(), labels)
 
     def _entropy(self, logarithms: Tensor, labels: Tensor) -> Tensor:
-        return functional.nll_loss(logarithms, labels, self.weights, ignore_index=NO_LABEL)
+        """Mean over the labelled pixels by their weights; 0 where a view shows none, as beyond the image's border."""
+        total = functional.nll_loss(logarithms, labels, self.weights, ignore_index=NO_LABEL, reduction="sum")
+        known = labels[labels != NO_LABEL]
+        return total / self.weights[known].sum().clamp_min(1e-6)
 
 
 def _enlarged(probabilities: Tensor, labels: Tensor) -> Tensor:

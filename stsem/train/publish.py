@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from stsem import chance
@@ -12,7 +13,7 @@ from stsem.inference.sidecar import Sidecar, render
 from stsem.models.export import Agreement, agreement, export_onnx
 from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
-from stsem.train.loop import averaged_weights, read_checkpoint
+from stsem.train.checkpoint import averaged_weights, read_checkpoint
 
 
 def load_checkpoint(path: Path, classes: int) -> SegmentationNetwork:
@@ -34,18 +35,25 @@ def load_checkpoint(path: Path, classes: int) -> SegmentationNetwork:
 def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passes: int = 0) -> Network:
     """Write `path` (.onnx) and its sidecar (.toml) for inputs of `sidecar.size`, and check them.
 
-    With `passes` of Monte Carlo dropout the graph also gives the maps of uncertainty.
+    The sidecar written has the sections that the network has inputs for (`Sidecar.for_inputs`). With `passes` of Monte
+    Carlo dropout the graph also gives the maps of uncertainty.
 
     Returns:
         The network as a user would load it.
 
     Raises:
-        NetworkError: the size does not fit, or the exported graph disagrees with torch.
+        NetworkError: the size does not fit, the sidecar lacks the scale of a difference that the network takes, or the
+            exported graph disagrees with torch.
         OutputError: a file cannot be written.
     """
+    described = sidecar.for_inputs(network.inputs)
+    if "difference" in network.inputs and described.difference is None:
+        raise NetworkError(
+            "The network takes the image difference, but its sidecar has no section [difference]; add one with a scale."
+        )
     export_onnx(network, path, size=sidecar.size, metadata={CLASS_COUNT: str(len(sidecar.classes))}, passes=passes)
     try:
-        path.with_suffix(".toml").write_text(render(sidecar), encoding="utf-8")
+        path.with_suffix(".toml").write_text(render(described), encoding="utf-8")
     except OSError as err:
         raise OutputError(f"The sidecar of {path} cannot be written: {err.strerror}.") from err
     published = load_network(path)
@@ -60,10 +68,11 @@ def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passe
 
 
 def _agreement_on_noise(network: SegmentationNetwork, published: Network, passes: int) -> Agreement:
-    """On a smooth random image and a shifted copy, so that classes change across it."""
+    """On a smooth random image and a shifted copy, so that classes change across it; depth of a room, with holes."""
     width, height = published.size
     coarse = torch.from_numpy(chance.generator(0, "agreement").random((1, 3, 12, 20)))
     full = torch.nn.functional.interpolate(coarse, size=(height, width + 8), mode="bicubic")[0]
     image = (full.clamp(0, 1) * 255).byte().permute(1, 2, 0).numpy()
-    inputs = network_inputs(image[:, 8:].copy(), image[:, :-8].copy(), published.sidecar)
+    depth = np.where(image[:, 8:, 0] < 32, np.nan, 1 + 4 * full[0, :, 8:].numpy()).astype(np.float32)
+    inputs = network_inputs(image[:, 8:].copy(), image[:, :-8].copy(), published.sidecar, depth)
     return agreement(network, published.path, inputs, passes)
