@@ -37,7 +37,7 @@ def confusion(truth: Labels, answer: Labels | None, classes: int) -> Matrix:
     if answer is None:
         return _unanswered(truth, classes)
     _require_labels("answer", answer)
-    pairs = _joint_counts(truth, resized(answer, truth.shape[1], truth.shape[0]), classes)
+    pairs = joint_counts(truth, resized(answer, truth.shape[1], truth.shape[0]), classes)
     matrix = np.empty((classes, classes + 1), np.int64)
     matrix[:, :classes] = pairs[:, :classes]
     matrix[:, classes] = pairs[:, classes:].sum(axis=1)
@@ -50,6 +50,18 @@ def resized(labels: Labels, width: int, height: int) -> Labels:
         return labels
     bigger = cv2.resize(np.ascontiguousarray(labels), (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
     return np.asarray(bigger, np.uint8)
+
+
+def joint_counts(a: Labels, b: Labels, rows: int) -> Matrix:
+    """(rows, 256) int64 counts of value pairs of two uint8 images of one size, `a` below `rows`."""
+    a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
+    if a.size < _EXACT_PIXELS:
+        return _histogram(a, b, rows)
+    flat_a, flat_b, step = a.reshape(1, -1), b.reshape(1, -1), _EXACT_PIXELS - 1
+    total = np.zeros((rows, 256), np.int64)
+    for start in range(0, a.size, step):
+        total += _histogram(flat_a[:, start : start + step], flat_b[:, start : start + step], rows)
+    return total
 
 
 class ConfusionMatrix:
@@ -84,18 +96,6 @@ def _unanswered(truth: Labels, classes: int) -> Matrix:
     matrix = np.zeros((classes, classes + 1), np.int64)
     matrix[:, classes] = np.bincount(truth.ravel(), minlength=NO_LABEL + 1)[:classes]
     return matrix
-
-
-def _joint_counts(a: Labels, b: Labels, rows: int) -> Matrix:
-    """(rows, 256) int64 counts of value pairs of two images of one size, `a` below `rows`."""
-    a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
-    if a.size < _EXACT_PIXELS:
-        return _histogram(a, b, rows)
-    flat_a, flat_b, step = a.reshape(1, -1), b.reshape(1, -1), _EXACT_PIXELS - 1
-    total = np.zeros((rows, 256), np.int64)
-    for start in range(0, a.size, step):
-        total += _histogram(flat_a[:, start : start + step], flat_b[:, start : start + step], rows)
-    return total
 
 
 def _histogram(a: Labels, b: Labels, rows: int) -> Matrix:
