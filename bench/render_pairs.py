@@ -1,9 +1,11 @@
-"""Render the pairs that the shipped network is trained on: consecutive frames of offices with their labels.
+"""Render the pairs that networks are trained on: consecutive frames of offices with their labels, and depth if asked.
 
     render_pairs.py .scratch/pairs --layouts 0 400 --pairs 10
+    render_pairs.py .scratch/paper-pairs/train --layouts 20000 20400 --pairs 5 --size 240 135 --depth
 
 Half of the pairs stand on the walk of a rendered log, half at a free place anywhere, since a walk keeps to its lane.
-Layouts 0 to 999 are for training and 5000 to 5099 for validation; the logs that ship have others (7001 to 7003).
+Layouts 0 to 999 train the shipped network and 5000 to 5099 validate it, 20000 to 22999 are for the paper's tables
+(docs/paper-tables.md); the logs that ship have others (7001 to 7003).
 """
 
 import argparse
@@ -11,6 +13,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from stsem import chance
 from stsem.camera import Camera
@@ -20,11 +23,11 @@ from stsem.synth.generate import office_camera
 from stsem.synth.office import Office
 from stsem.synth.path import pose_at, profile, walk
 from stsem.synth.scene import Scene
-from stsem.synth.sensor import expose
+from stsem.synth.sensor import expose, kinect
 from stsem.synth.view import View
 from stsem.train.dataset import Pair, save_pair
 
-WIDTH, HEIGHT = 480, 270
+FOCALS_PER_WIDTH = 250 / 480, 400 / 480
 WALK_S, PERIOD_S = 60.0, 0.1
 MARGIN_M = 0.25
 ATTEMPTS = 6
@@ -39,7 +42,7 @@ def walked(layout: int, office: Office, count: int) -> list[tuple[Pose, Pose, fl
     return [(pose_at(states, t), pose_at(states, t + PERIOD_S), float(t)) for t in times]
 
 
-def free(scene: Scene, rng: np.random.Generator) -> tuple[Pose, Pose, Camera]:
+def free(scene: Scene, size: tuple[int, int], rng: np.random.Generator) -> tuple[Pose, Pose, Camera]:
     """Two poses a period apart anywhere on the floor, and a camera of any usual focal length."""
     x, y = _place(scene.office, rng)
     targets = scene.office.furnishing.targets
@@ -48,10 +51,11 @@ def free(scene: Scene, rng: np.random.Generator) -> tuple[Pose, Pose, Camera]:
         point = targets[int(rng.integers(len(targets)))].point
         yaw = float(np.arctan2(point[1] - y, point[0] - x) + rng.normal(0, 0.25))
     z, pitch, roll = rng.uniform(0.8, 1.5), rng.normal(-0.08, 0.12), rng.normal(0, 0.02)
-    focal = float(np.exp(rng.uniform(np.log(250), np.log(400))))
+    width, height = size
+    focal = float(np.exp(rng.uniform(*np.log(FOCALS_PER_WIDTH)))) * width
     step, turn, heading = rng.uniform(0, 0.06), rng.normal(0, 0.05), yaw + rng.normal(0, 0.3)
     moved = (x + step * np.cos(heading), y + step * np.sin(heading), z)
-    camera = Camera(WIDTH, HEIGHT, focal, focal, (WIDTH - 1) / 2, (HEIGHT - 1) / 2)
+    camera = Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
     return _pose((x, y, z), yaw, pitch, roll), _pose(moved, yaw + turn, pitch, roll), camera
 
 
@@ -83,7 +87,7 @@ def _pose(place: tuple[float, float, float], yaw: float, pitch: float, roll: flo
     return pose
 
 
-def render(layout: int, count: int, folder: Path) -> None:
+def render(layout: int, count: int, folder: Path, size: tuple[int, int], *, depth: bool) -> None:
     """The pairs of one layout; one whose last pair is there already is skipped."""
     if (folder / f"{layout:05}_{count - 1:02}.npz").exists():
         return
@@ -93,18 +97,25 @@ def render(layout: int, count: int, folder: Path) -> None:
         rng = chance.generator(layout, "pair", k)
         if k % 2 == 0:
             first, second, time_s = tour[k // 2]
-            camera = office_camera(WIDTH, HEIGHT)
+            camera = office_camera(*size)
             views = [scene.look(camera, first, time_s)]
         else:
             views, time_s = [], float(rng.uniform(0, WALK_S))
             for attempt in range(ATTEMPTS):
-                first, second, camera = free(scene, rng)
+                first, second, camera = free(scene, size, rng)
                 views = [scene.look(camera, first, time_s)]
                 if attempt == ATTEMPTS - 1 or _is_rich(views[0]):
                     break
         views.append(scene.look(camera, second, time_s + PERIOD_S))
         images = np.stack([_recorded(expose(view.radiance, 1.0, rng)) for view in views])
-        save_pair(folder / f"{layout:05}_{k:02}.npz", Pair(images, np.stack([view.labels for view in views])))
+        depths = _measured(views, camera, layout, k) if depth else None
+        save_pair(folder / f"{layout:05}_{k:02}.npz", Pair(images, np.stack([view.labels for view in views]), depths))
+
+
+def _measured(views: list[View], camera: Camera, layout: int, k: int) -> npt.NDArray[np.float32]:
+    """(2, H, W) metres as a Kinect gives them, NaN unknown."""
+    return np.stack([kinect(view.depth, camera.fx, chance.generator(layout, "depth", k, i))
+                     for i, view in enumerate(views)])  # fmt: skip
 
 
 def _recorded(image: Image) -> Image:
@@ -124,8 +135,10 @@ if __name__ == "__main__":
     parser.add_argument("folder", type=Path)
     parser.add_argument("--layouts", type=int, nargs=2, required=True, help="first, and one past the last")
     parser.add_argument("--pairs", type=int, default=10, help="pairs of each layout")
+    parser.add_argument("--size", type=int, nargs=2, default=(480, 270), help="width and height, pixels")
+    parser.add_argument("--depth", action="store_true", help="keep the depth that a Kinect would measure")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     for number in range(*given.layouts):
-        render(number, given.pairs, given.folder)
+        render(number, given.pairs, given.folder, tuple(given.size), depth=given.depth)
         print(number, flush=True)
