@@ -36,6 +36,6 @@ $(VENV)/.demo-ready: pyproject.toml
 
 $(VENV)/.test-ready: $(VENV)/.demo-ready pyproject.toml
 	test -z "$(TORCH)" || $(PIP) "$(TORCH)"
-	$(PIP) --editable '.[synth,remote,convert]' --group dev --group oracle
+	$(PIP) --editable '.[synth,remote,convert,openvino,quantize]' --group dev --group oracle
 	test -z "$(TORCH)" || $(PIP) --editable '.[train]' --group torch-oracle
 	touch $@

@@ -36,9 +36,12 @@ def replay(
         _option("--model", panel=_PIPELINE, metavar="NAME|ONNX|oracle", help="Network, or the truth as one. [default]"),
     ] = None,
     backend: Annotated[
-        str | None, _option("--backend", panel=_PIPELINE, help="What runs the network: onnxruntime. [onnxruntime]")
+        str | None,
+        _option("--backend", panel=_PIPELINE, help="What runs the network: onnxruntime or openvino. [onnxruntime]"),
     ] = None,
-    precision: Annotated[str | None, _option("--precision", panel=_PIPELINE, help="Arithmetic: f32. [f32]")] = None,
+    precision: Annotated[
+        str | None, _option("--precision", panel=_PIPELINE, help="f32, int8 or (openvino only) bf16. [f32]")
+    ] = None,
     keyframes: Annotated[
         str | None, _option("--keyframes", panel=_PIPELINE, metavar="POLICY", help="paper or every:N. [paper]")
     ] = None,

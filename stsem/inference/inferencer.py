@@ -15,6 +15,7 @@ from stsem.inference.backends import DEFAULT_BACKEND, DEFAULT_PRECISION, choose_
 from stsem.inference.cpu import cpu_features
 from stsem.inference.network import Network, OutputKind
 from stsem.inference.preprocess import labels_at, network_inputs
+from stsem.inference.variant import at_precision
 from stsem.uncertainty import CONFIDENCE_STEPS, Uncertainty, ceiling, to_levels
 
 
@@ -53,7 +54,8 @@ class Inferencer:
         threads: threads of the session; the labels do not depend on it.
 
     Raises:
-        NetworkError, UsageError, MissingExtraError: see `choose_backend`; or the graph cannot be loaded.
+        NetworkError, UsageError, MissingExtraError: see `choose_backend` and `at_precision`; or the graph cannot be
+            loaded.
     """
 
     def __init__(
@@ -62,11 +64,11 @@ class Inferencer:
         if threads < 1:
             raise UsageError(f"The number of threads is {threads}; it must be at least 1.")
         row = choose_backend(backend, precision)
-        self.network = network
+        self.network = network = at_precision(network, precision)
         self.identity = Identity(
             backend, _versions(row.distribution), precision, cpu_features(), network.sha256
         )  # fmt: skip
-        self._session = row.open(network.path, threads)
+        self._session = row.open(network.path, precision, threads)
 
     def infer(self, frame: Frame) -> Segmentation:
         """Labels, in the network's ids, confidence and maps of uncertainty of `frame`, all at its image's size.

@@ -13,6 +13,8 @@ from stsem.uncertainty import MEASURES
 
 SHIPPED = Path(__file__).parent / "networks"
 DEFAULT = "default"
+VARIANT_SUFFIX = ".int8.onnx"
+"""`name.int8.onnx` beside `name.onnx` is the same network in int8 (stsem/inference/variant.py)."""
 CLASS_COUNT = "stsem.class_count"
 """Metadata key in our ONNX files: the number of classes, since `labels` does not show it."""
 
@@ -42,6 +44,7 @@ class Network:
         output: what the graph returns.
         model_sha256, sidecar_sha256: of the two files' bytes, hexadecimal.
         measures: maps of uncertainty that it also returns, of MEASURES; each (1, H, W) float32.
+        precision: of the file's arithmetic: "f32", or "int8" for a variant.
     """
 
     name: str
@@ -51,6 +54,7 @@ class Network:
     model_sha256: str
     sidecar_sha256: str
     measures: tuple[str, ...] = ()
+    precision: str = "f32"
 
     @property
     def sha256(self) -> str:
@@ -80,7 +84,7 @@ class Network:
 
 def shipped_networks() -> tuple[str, ...]:
     """Names of the networks inside the package."""
-    return tuple(sorted(path.stem for path in SHIPPED.glob("*.onnx")))
+    return tuple(sorted(path.stem for path in SHIPPED.glob("*.onnx") if not _is_variant(path)))
 
 
 def load_network(path_or_name: str | Path) -> Network:
@@ -111,6 +115,11 @@ def load_network(path_or_name: str | Path) -> Network:
 
 def _locate(path_or_name: str | Path) -> Path:
     given = Path(path_or_name)
+    if _is_variant(given):
+        plain = given.name.removesuffix(VARIANT_SUFFIX) + ".onnx"
+        raise NetworkError(
+            f"{given} is named as the int8 variant of {plain}; give {plain} with --precision int8, or rename it."
+        )
     if given.suffix == ".onnx":
         if given.is_file():
             return given
@@ -119,6 +128,10 @@ def _locate(path_or_name: str | Path) -> Path:
         return SHIPPED / f"{path_or_name}.onnx"
     known = ", ".join((*shipped_networks(), "oracle"))
     raise NetworkError(f"There is no network {str(path_or_name)!r}; give a file ending in .onnx, or one of {known}.")
+
+
+def _is_variant(path: Path) -> bool:
+    return path.name.endswith(VARIANT_SUFFIX)
 
 
 def _read(path: Path) -> bytes:

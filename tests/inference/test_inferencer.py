@@ -90,8 +90,10 @@ def test_backend_and_precision_are_checked(files: Files) -> None:
     network = load_network(files())
     with pytest.raises(UsageError, match=r"'tensorrt'.*onnxruntime"):
         Inferencer(network, backend="tensorrt")
-    with pytest.raises(UsageError, match=r"'int8'.*f32"):
-        Inferencer(network, precision="int8")
+    with pytest.raises(UsageError, match=r"'float8'.*f32, int8\.$"):
+        Inferencer(network, precision="float8")
+    with pytest.raises(UsageError, match=r"'bf16'.*--backend openvino"):
+        Inferencer(network, precision="bf16")
     with pytest.raises(UsageError, match="threads is 0"):
         Inferencer(network, threads=0)
 

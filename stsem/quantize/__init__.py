@@ -1,0 +1,1 @@
+"""A network in int8, made on frames of logs. Needs `onnx`; a replay never comes here."""
