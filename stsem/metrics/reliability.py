@@ -63,8 +63,9 @@ def rightness(truth: Labels, answer: Labels, classes: int) -> Levels:
         answer: (h, w) uint8, resized by nearest neighbour.
         classes: C.
     """
-    found = np.where(resized(answer, truth.shape[1], truth.shape[0]) == truth, RIGHT, WRONG)
-    return np.where(truth < classes, found, IGNORED).astype(np.uint8)
+    wrong = (resized(answer, truth.shape[1], truth.shape[0]) != truth).view(np.uint8)
+    ignored = np.uint8(IGNORED) * (truth >= classes).view(np.uint8)
+    return np.maximum(wrong, ignored)
 
 
 def error_counts(levels: Levels, right: Levels) -> Counts:
