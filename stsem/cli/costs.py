@@ -18,8 +18,10 @@ def measure(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Where the profile goes.")],
     model: Annotated[str, typer.Option("--model", metavar="NAME|ONNX", help="The network.")] = "default",
     propagation: Annotated[str, typer.Option("--propagation", help="The method between keyframes.")] = "homography",
-    backend: Annotated[str, typer.Option("--backend", help="What runs the network.")] = "onnxruntime",
-    precision: Annotated[str, typer.Option("--precision", help="Its arithmetic.")] = "f32",
+    backend: Annotated[
+        str, typer.Option("--backend", help="What runs the network: onnxruntime or openvino.")
+    ] = "onnxruntime",
+    precision: Annotated[str, typer.Option("--precision", help="f32, int8 or (openvino only) bf16.")] = "f32",
     samples: Annotated[int, typer.Option("--samples", min=1, help="Undisturbed samples per stage.")] = 60,
     seconds: Annotated[float, typer.Option("--seconds", min=0.1, help="Longest time per stage.")] = 60.0,
 ) -> int:

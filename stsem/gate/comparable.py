@@ -64,6 +64,13 @@ def _costs(base: Identity, head: Identity) -> list[str]:
     return []
 
 
+def arithmetic_change(base: Identity, head: Identity) -> str:
+    """A sentence when the two networks computed in another way; "" when not, or when either was the oracle."""
+    if not (base.precision and head.precision) or (base.backend, base.precision) == (head.backend, head.precision):
+        return ""
+    return f"The report is in {head.precision} by {head.backend}, the baseline in {base.precision} by {base.backend}."
+
+
 def environment_changes(base: Identity, head: Identity) -> tuple[str, ...]:
     """What differs between the installations: `onnxruntime 1.29.0 -> 1.30.0`."""
     found = []

@@ -4,7 +4,7 @@ from stsem.document.schema import Document
 from stsem.document.timing import Outcomes
 from stsem.errors import NothingMeasuredError
 from stsem.gate.baseline import Baseline, BaselineRun, make_baseline
-from stsem.gate.comparable import environment_changes, obstacles
+from stsem.gate.comparable import arithmetic_change, environment_changes, obstacles
 from stsem.gate.rules import Limits, Rule
 from stsem.gate.verdict import Check, GateState, GateVerdict, Mark, exit_code
 
@@ -97,10 +97,11 @@ def _outcome_change(base: Outcomes, head: Outcomes) -> str:
 def _verdict(
     state: GateState, reasons: tuple[str, ...], checks: tuple[Check, ...], report: Document, baseline: Baseline
 ) -> GateVerdict:
+    arithmetic = arithmetic_change(baseline.identity, report.identity)
     return GateVerdict(
         state=state,
         exit_code=exit_code(state, report.state == "lossy"),
-        headline=_headline(state, reasons, checks),
+        headline=" ".join(filter(None, (_headline(state, reasons, checks), arithmetic))),
         reasons=reasons,
         checks=checks,
         environment=environment_changes(baseline.identity, report.identity),

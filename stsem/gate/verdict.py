@@ -49,7 +49,7 @@ class GateVerdict(Part):
     exit_code: int
     """Exit code of the command: 0 passed, 3 passed on a lossy input, 4 failed, 5 nothing to judge."""
     headline: str
-    """One sentence with the worst number."""
+    """The worst number; a second sentence when the two computed in another precision or by another backend."""
     reasons: tuple[str, ...] = ()
     """Why it failed or could not be judged, one sentence each."""
     checks: tuple[Check, ...] = ()

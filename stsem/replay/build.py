@@ -13,6 +13,7 @@ from stsem.errors import ChannelError, ClassTableError
 from stsem.inference.backends import choose_backend
 from stsem.inference.cache import CachedInferencer, OutputCache, cache_root
 from stsem.inference.network import Network, load_network
+from stsem.inference.variant import at_precision
 from stsem.log.log import Log
 from stsem.log.plan import NEEDS
 from stsem.replay.answer import AnswerRule, Prediction
@@ -60,7 +61,8 @@ def build_model(log: Log, config: RunConfig) -> Model:
 
     Raises:
         UsageError: there is no such backend or precision; it is said of the oracle, too, which needs none.
-        NetworkError: the network cannot be used.
+        MissingExtraError: the backend is not installed.
+        NetworkError: the network cannot be used, or has no variant for the precision.
         ClassTableError: the oracle without truth, or a class map that cannot be read or names unknown classes.
         ChannelError: the network takes depth, but the log has none that can be used.
     """
@@ -68,7 +70,7 @@ def build_model(log: Log, config: RunConfig) -> Model:
     class_map = _class_map(config.class_map)
     if config.is_oracle:
         return _oracle(log)
-    network = load_network(config.model)
+    network = at_precision(load_network(config.model), config.precision)
     _check_depth(network, log)
     classes, table, reason = _meeting(network.classes, log, class_map)
     make = partial(_network_segmenter, network, table, log, config)

@@ -54,8 +54,8 @@ class RunConfig(BaseModel):
 
     mode: str = Field("per-frame,keyframe", description="Modes to run, comma separated, or 'both'.")
     model: str = Field("default", description="Shipped network, a FILE.onnx with its sidecar .toml, or 'oracle'.")
-    backend: str = Field("onnxruntime", description="What runs the network.")
-    precision: str = Field("f32", description="Arithmetic of the network.")
+    backend: str = Field("onnxruntime", description="What runs the network: onnxruntime or openvino.")
+    precision: str = Field("f32", description="Arithmetic of the network: f32, int8 or (openvino only) bf16.")
     keyframes: str = Field("paper", description="Keyframe policy: 'paper' or 'every:N'.")
     keyframe_rotation: float = Field(0.1, gt=0, description="paper: threshold on |H[:2,:2] - I|_F.")
     keyframe_translation: float = Field(0.15, gt=0, description="paper: threshold on |H[:2,2]|, in image widths.")

@@ -12,8 +12,10 @@ from pathlib import Path
 from stsem import __version__, hostclock
 from stsem.errors import CostError, DecodeError, OutputError, UsageError
 from stsem.frame import Frame
+from stsem.inference.backends import BACKENDS
 from stsem.inference.cache import cache_root
 from stsem.inference.network import DEFAULT, Network, load_network
+from stsem.inference.variant import at_precision
 from stsem.log.log import Log
 from stsem.replay.build import Model
 from stsem.replay.calibrate import Subject, measure
@@ -94,7 +96,7 @@ def _of_profile(name: str, profile: CostProfile, log: Log, config: RunConfig) ->
 
 def subject(log: Log, config: RunConfig, model: Model, cores: tuple[int, ...], *, fused: bool) -> Subject:
     """What a profile for this configuration must hold; `cores`: how many the network may claim."""
-    network: Network = model.network or load_network(DEFAULT)
+    network: Network = model.network or at_precision(load_network(DEFAULT), config.precision)
     decode = _decoder(log, depth="depth" in model.needs(fused=fused)) if config.count_decode else None
     return Subject(
         network, config.backend, config.precision, cores, PROPAGATIONS[config.propagation](), config.seed, decode
@@ -126,11 +128,12 @@ def _calibrated(log: Log, config: RunConfig, model: Model, fused: bool, say: Cal
     cores = tuple(sorted({min(mode.network_cores, config.cores) for mode in config.modes}))
     wanted = subject(log, config, model, cores, fused=fused)
     frames = calibration_frames(log, model.needs(fused=fused))
+    distribution = BACKENDS[wanted.backend].distribution
     about = {
         "machine": hostclock.machine_name(), "network": wanted.network.sha256, "size": frames[0].size,
         "backend": [wanted.backend, wanted.precision], "cores": wanted.network_cores,
         "propagation": config.propagation, "fused": fused, "decode": config.count_decode,
-        "onnxruntime": importlib.metadata.version("onnxruntime"),
+        distribution: importlib.metadata.version(distribution),
         "opencv": importlib.metadata.version("opencv-python-headless"), "stsem": __version__,
     }  # fmt: skip
     digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:16]

@@ -8,6 +8,7 @@ from stsem.document.canonical import sealed
 from stsem.document.origin import Channel, Host, Identity, Input, LogInput
 from stsem.document.schema import Document, Run, State, Verdict
 from stsem.errors import EXIT_FINE, EXIT_LOSSY, EXIT_NOTHING_MEASURED
+from stsem.inference.backends import BACKENDS
 from stsem.inference.cpu import cpu_features
 from stsem.log.log import Log
 from stsem.replay.comparison import Contender, compare
@@ -95,7 +96,8 @@ def _verdict(context: Context, state: str, scored: int, reason: str) -> Verdict:
 
 def _identity(context: Context) -> Identity:
     network, costing, config = context.model.network, context.costing, context.config
-    versions = {name: importlib.metadata.version(name) for name in _PACKAGES}
+    packages = {*_PACKAGES, *([BACKENDS[config.backend].distribution] if network else [])}
+    versions = {name: importlib.metadata.version(name) for name in sorted(packages)}
     return Identity(
         backend=config.backend if network else "oracle",
         precision=config.precision if network else "",
@@ -160,6 +162,19 @@ def _channels(log: Log) -> dict[str, Channel]:
     return table
 
 
+def _foreign_costs(context: Context) -> list[str]:
+    """That the network's durations are those of another backend or precision, where the profile says so."""
+    profile = None if context.costing is None else context.costing.profile
+    if profile is None or context.model.network is None:
+        return []
+    measured, ran = profile.made_for.get("backend"), f"{context.config.backend} {context.config.precision}"
+    if measured is None or measured == ran:
+        return []
+    return [
+        f"The cost profile was measured with {measured}, but the network ran with {ran}: the timing is the former's."
+    ]
+
+
 def _warnings(context: Context) -> tuple[str, ...]:
     found = [*map(str, context.log.info.warnings), *context.notes]
     found += [
@@ -176,6 +191,7 @@ def _warnings(context: Context) -> tuple[str, ...]:
     costing = context.costing
     if costing is not None and costing.profile is not None and costing.profile.disturbed:
         found.append("The cost profile was measured while other work held a core; its durations are too long.")
+    found += _foreign_costs(context)
     if context.config.costs == "measured" and context.config.clock == "real-time":
         found.append("Durations were measured as they happened on this machine: timing does not repeat.")
     return tuple(found)

@@ -28,9 +28,10 @@ def closing_table(document: Document) -> str:
 
 
 def _inputs(document: Document) -> str:
-    """What the network was given, in a sentence; nothing for the oracle."""
+    """What the network was given, and in what it computed if not in f32; nothing for the oracle."""
     who = document.identity
-    return f" Inputs of the network {who.model}: {', '.join(who.model_inputs)}." if who.model_inputs else ""
+    how = f" It ran in {who.precision} by {who.backend}." if who.precision not in ("", "f32") else ""
+    return f" Inputs of the network {who.model}: {', '.join(who.model_inputs)}.{how}" if who.model_inputs else ""
 
 
 def basis(document: Document) -> str:

@@ -76,7 +76,7 @@ def test_no_log(replay: Cli, home: Path, make: Callable[[Path], Path], words: li
         (["--map", "maybe"], 2, ["map", "on or off", "'maybe'"]),
         (["--set", "map=2"], 2, ["map", "on or off", "2"]),
         (["--precision", "f16"], 2, ["precision", "f32", "f16"]),
-        (["--precision", "int8"], 2, ["int8", "onnxruntime"]),
+        (["--precision", "bf16"], 2, ["bf16", "onnxruntime", "--backend openvino"]),
         (["--pose", "slam"], 2, ["pose", "log", "slam"]),
         (["--propagation", "magic"], 2, ["magic", "homography"]),
         (["--keyframes", "every:0"], 2, ["every:0", "every:N"]),

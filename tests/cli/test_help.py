@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from stsem.cli import main
-from stsem.inference.backends import BACKENDS
+from stsem.inference.backends import BACKENDS, PRECISIONS
 from stsem.replay.modes import MODES
 from stsem.stages.propagate import PROPAGATIONS
 from stsem.stages.select import POLICIES
@@ -16,6 +16,7 @@ CHOICES = {
     "--propagation": list(PROPAGATIONS),
     "--keyframes": [spelling for spelling, _ in POLICIES.values()],
     "--backend": list(BACKENDS),
+    "--precision": list(PRECISIONS),
 }
 
 
