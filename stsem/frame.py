@@ -8,7 +8,7 @@ import numpy.typing as npt
 from stsem.camera import Camera
 from stsem.classes import Labels
 from stsem.pose import Pose
-from stsem.uncertainty import Uncertainty
+from stsem.uncertainty import Confidence, Uncertainty
 
 Image = npt.NDArray[np.uint8]
 Depth = npt.NDArray[np.float32]
@@ -54,5 +54,5 @@ class Segmentation:
     """
 
     labels: Labels
-    confidence: npt.NDArray[np.float32] | None = None
+    confidence: Confidence | None = None
     uncertainty: Uncertainty | None = None

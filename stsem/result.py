@@ -7,6 +7,7 @@ from struct import Struct
 
 from stsem.classes import Labels
 from stsem.packed import Codes, Packed, packed_time, unpacked_time
+from stsem.uncertainty import Confidence, Uncertainty
 
 STAGES: tuple[str, ...] = ("decode", "register", "segment", "propagate", "fuse")
 """Every stage that can hold a core, in pipeline order: among jobs of one frame the earlier stage goes first, and
@@ -70,6 +71,8 @@ class FrameResult:
         coverage: share of pixels of `labels` that are not NO_LABEL; None without an answer.
         spans: its jobs, in order of start.
         labels: (H, W) uint8 in the log's classes; None without an answer.
+        confidence: (H, W) float32 that goes with the labels; None where none is stated.
+        uncertainty: maps (H, W) from the network; None where it gives none, and for answers that were predicted.
     """
 
     index: int
@@ -83,6 +86,8 @@ class FrameResult:
     coverage: float | None = None
     spans: tuple[Span, ...] = field(default=())
     labels: Labels | None = None
+    confidence: Confidence | None = None
+    uncertainty: Uncertainty | None = None
 
 
 class Spans(Packed[Span]):
@@ -107,7 +112,7 @@ _OUTCOMES = tuple(Outcome)
 
 
 class Results(Packed[FrameResult]):
-    """What became of frames, without spans and labels, in 53 bytes each."""
+    """What became of frames, without spans and images, in 53 bytes each."""
 
     layout = Struct("<iqqqqbiid")
 

@@ -21,6 +21,8 @@ ROOT = 4
 must still be seen."""
 
 Levels = npt.NDArray[np.uint8]
+Confidence = npt.NDArray[np.float32]
+"""(H, W) in 0..1."""
 
 
 def ceiling(measure: str, classes: int) -> float:
@@ -35,7 +37,7 @@ def ceiling(measure: str, classes: int) -> float:
 def to_levels(values: npt.NDArray[np.float32], measure: str, classes: int) -> Levels:
     """Values of a measure, any shape, as levels 0..TOP_LEVEL; value = ceiling (level / TOP_LEVEL)^ROOT."""
     shares = values.clip(0, None) / np.float32(ceiling(measure, classes) or 1)  # with one class all values are 0
-    return np.rint(np.sqrt(np.sqrt(shares.clip(0, 1))) * TOP_LEVEL).astype(np.uint8)
+    return np.asarray(np.rint(np.sqrt(np.sqrt(shares.clip(0, 1))) * TOP_LEVEL), np.uint8)
 
 
 def to_values(levels: Levels, measure: str, classes: int) -> npt.NDArray[np.float64]:
@@ -64,6 +66,12 @@ class Uncertainty:
     def values(self, measure: str) -> npt.NDArray[np.float64]:
         """(H, W) values of one measure: entropy and mutual information in nats."""
         return to_values(self.of(measure), measure, self.classes)
+
+    def mean(self, measure: str) -> float:
+        """Mean value of one measure over the image."""
+        counts = np.bincount(self.of(measure).ravel(), minlength=TOP_LEVEL + 1)
+        values = to_values(np.arange(TOP_LEVEL + 1, dtype=np.uint8), measure, self.classes)
+        return float((counts * values).sum() / counts.sum())
 
     def each(self, change: Callable[[Levels], Levels]) -> "Uncertainty":
         """The same measures with `change` applied to each (H, W) map."""

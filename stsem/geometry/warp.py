@@ -1,10 +1,16 @@
 """Moving labels from a keyframe to the current frame: every current pixel fetches, so no holes and no blending."""
 
+from typing import TypeVar
+
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from stsem.classes import NO_LABEL, Labels
 from stsem.geometry.homography import Matrix3
+from stsem.uncertainty import Confidence
+
+Value = TypeVar("Value", np.uint8, np.float32)
 
 
 def warp_labels(labels: Labels, H: Matrix3, size: tuple[int, int]) -> Labels:
@@ -19,13 +25,19 @@ def warp_labels(labels: Labels, H: Matrix3, size: tuple[int, int]) -> Labels:
     return np.asarray(warped, np.uint8)
 
 
-def warp_onto(background: Labels, labels: Labels, H: Matrix3) -> Labels:
+def warp_confidence(confidence: Confidence, H: Matrix3, size: tuple[int, int]) -> Confidence:
+    """The confidence (H, W) that goes with labels, moved as `warp_labels` moves them; 0 where the keyframe ends."""
+    warped = cv2.warpPerspective(confidence, H, size, flags=cv2.INTER_NEAREST, borderValue=0)
+    return np.asarray(warped, np.float32)
+
+
+def warp_onto(background: npt.NDArray[Value], labels: npt.NDArray[Value], H: Matrix3) -> npt.NDArray[Value]:
     """`warp_labels` with the labels of `background` (H, W), which is left as it is, where the keyframe does not reach.
 
-    A pixel for which the keyframe has NO_LABEL gets NO_LABEL: it was reached.
+    A pixel for which the keyframe has NO_LABEL gets NO_LABEL: it was reached. Confidence is moved likewise.
     """
     height, width = background.shape
     warped = cv2.warpPerspective(
         labels, H, (width, height), dst=background.copy(), flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_TRANSPARENT
     )
-    return np.asarray(warped, np.uint8)
+    return np.asarray(warped, background.dtype)

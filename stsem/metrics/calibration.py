@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from stsem.classes import Labels
 from stsem.metrics.reliability import WRONG, Counts, Reliability, area_under_roc, error_counts, reliability, rightness
 from stsem.metrics.scorecard import STRATA
 from stsem.result import Outcome
-from stsem.uncertainty import CONFIDENCE_STEPS, Uncertainty
+from stsem.uncertainty import CONFIDENCE_STEPS, Confidence, Uncertainty
 
 DOUBT = "one_minus_confidence"
 """The measure of uncertainty that every network has: 1 - confidence."""
@@ -70,7 +69,7 @@ class CalibrationMeter:
         answer: Labels,
         *,
         outcome: Outcome,
-        confidence: npt.NDArray[np.float32],
+        confidence: Confidence,
         uncertainty: Uncertainty | None = None,
     ) -> None:
         """Add an answer with its frame's truth.

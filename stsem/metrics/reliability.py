@@ -65,7 +65,7 @@ def rightness(truth: Labels, answer: Labels, classes: int) -> Levels:
     """
     wrong = (resized(answer, truth.shape[1], truth.shape[0]) != truth).view(np.uint8)
     ignored = np.uint8(IGNORED) * (truth >= classes).view(np.uint8)
-    return np.maximum(wrong, ignored)
+    return np.asarray(np.maximum(wrong, ignored), np.uint8)
 
 
 def error_counts(levels: Levels, right: Levels) -> Counts:

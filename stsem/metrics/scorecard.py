@@ -76,6 +76,11 @@ class Scorecard:
         self._distances = ByDistance(len(classes))
         self._ages = Durations()
 
+    @property
+    def class_count(self) -> int:
+        """C, of the log."""
+        return len(self._classes)
+
     def judge(
         self,
         index: int,

@@ -4,9 +4,10 @@ The real-time run calls these steps as jobs on the simulated cores, the offline 
 by the same rule.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stsem.frame import Frame, Segmentation
+from stsem.result import FrameResult
 from stsem.stages.keyframe import Keyframe
 from stsem.stages.propagate import Propagation
 from stsem.stages.register import Registering, Registration
@@ -105,3 +106,10 @@ class AnswerRule:
         homography = None if registration is None else registration.homography
         motion = None if homography is None else Motion.of(homography, frame.size)
         return policy.reason(Candidate(frame.index, last.index, frame.stamp_ns - last.stamp_ns, motion))
+
+
+def with_answer(result: FrameResult, answer: Segmentation | None) -> FrameResult:
+    """`result` with the images of its answer, if there is one."""
+    if answer is None:
+        return result
+    return replace(result, labels=answer.labels, confidence=answer.confidence, uncertainty=answer.uncertainty)

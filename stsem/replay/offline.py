@@ -2,10 +2,9 @@
 
 from collections.abc import Sequence
 
-from stsem.classes import Labels
 from stsem.frame import Frame, Segmentation
 from stsem.log.log import Loaded
-from stsem.replay.answer import AnswerRule
+from stsem.replay.answer import AnswerRule, with_answer
 from stsem.replay.realtime import Judge
 from stsem.replay.schedule import Slot
 from stsem.result import FrameResult, Outcome
@@ -66,7 +65,5 @@ class OfflineRun:
         self, slot: Slot, loaded: Loaded, outcome: Outcome, *, answer: Segmentation | None = None,
         keyframe: int | None = None, reason: str = "",
     ) -> None:  # fmt: skip
-        labels: Labels | None = None if answer is None else answer.labels
-        self._judge.ended(
-            FrameResult(slot.index, slot.stamp_ns, None, None, None, outcome, keyframe, reason, labels=labels), loaded
-        )
+        result = FrameResult(slot.index, slot.stamp_ns, None, None, None, outcome, keyframe, reason)
+        self._judge.ended(with_answer(result, answer), loaded)

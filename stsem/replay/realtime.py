@@ -7,7 +7,7 @@ from typing import Protocol, TypeVar
 from stsem.classes import Labels
 from stsem.frame import Frame, Segmentation
 from stsem.log.log import Loaded
-from stsem.replay.answer import AnswerRule
+from stsem.replay.answer import AnswerRule, with_answer
 from stsem.replay.queues import Mailbox
 from stsem.replay.schedule import Slot, watermarks
 from stsem.replay.waiting import WaitingRoom
@@ -208,26 +208,25 @@ class RealTimeRun:
 
     def _answer(self, task: _Task, outcome: Outcome, answer: Segmentation | None, source: int | None) -> None:
         self._state.task = None
-        labels = None if answer is None else answer.labels
         newest = self._state.newest
-        if labels is not None and (newest is None or task.slot.stamp_ns >= newest.stamp_ns):
-            self._state.newest = NewestAnswer(task.slot.stamp_ns, labels)
+        if answer is not None and (newest is None or task.slot.stamp_ns >= newest.stamp_ns):
+            self._state.newest = NewestAnswer(task.slot.stamp_ns, answer.labels)
         self._end(
-            task.slot, task.loaded, outcome, taken_ns=task.taken_ns, answered_ns=self._queue.now_ns, labels=labels,
+            task.slot, task.loaded, outcome, taken_ns=task.taken_ns, answered_ns=self._queue.now_ns, answer=answer,
             keyframe=source, reason=task.reason,
         )  # fmt: skip
         self._take()
 
     def _end(
         self, slot: Slot, loaded: Loaded, outcome: Outcome, *, taken_ns: int | None = None,
-        answered_ns: int | None = None, labels: Labels | None = None, keyframe: int | None = None, reason: str = "",
+        answered_ns: int | None = None, answer: Segmentation | None = None, keyframe: int | None = None,
+        reason: str = "",
     ) -> None:  # fmt: skip
         result = FrameResult(
             index=slot.index, stamp_ns=slot.stamp_ns, arrival_ns=slot.arrival_ns, taken_ns=taken_ns,
             answered_ns=answered_ns if outcome.is_answer else None, outcome=outcome, keyframe=keyframe, reason=reason,
-            labels=labels,
         )  # fmt: skip
-        self._judge.ended(result, loaded)
+        self._judge.ended(with_answer(result, answer), loaded)
 
     def _submit(
         self, frame: Frame, stage: str, cores: int, work: Callable[[], T], on_finish: Callable[[T], None]

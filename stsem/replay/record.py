@@ -8,10 +8,12 @@ import numpy as np
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.frame import Frame
 from stsem.log.log import Loaded
+from stsem.metrics.calibration import CalibrationMeter
 from stsem.metrics.consistency import ConsistencyMeter
 from stsem.metrics.scorecard import Scorecard
 from stsem.replay.realtime import NewestAnswer
 from stsem.replay.schedule import Slot
+from stsem.replay.unsure import Unsurest
 from stsem.result import FrameResult, Outcome, Results
 
 Watch = Callable[[FrameResult, Frame], None]
@@ -25,7 +27,7 @@ class Record:
         slots: every frame of the log, in log order.
         scorecard: None when accuracy cannot be measured.
         watched: log indices whose answers are kept for pictures.
-        classes: of the answers; None to leave temporal consistency out.
+        classes: of the answers; None to leave temporal consistency, and the frame to look at, out.
         watch: called with every answered frame; None when nobody looks.
     """
 
@@ -40,6 +42,8 @@ class Record:
         self._slots, self._watched = slots, watched
         self.scorecard = scorecard
         self.consistency = None if classes is None else ConsistencyMeter(len(classes))
+        self.calibration = None if scorecard is None else CalibrationMeter(scorecard.class_count)
+        self.unsurest = None if classes is None else Unsurest()
         self._watch = watch
         self.results = Results()
         self.answers: dict[int, Labels] = {}
@@ -70,6 +74,8 @@ class Record:
             self.answers[result.index] = labels
         if self.consistency is not None:
             self.consistency.update(labels)
+        if self.unsurest is not None:
+            self.unsurest.update(result, loaded)
         if self._watch is not None and loaded.frame is not None:
             self._watch(result, loaded.frame)
 
@@ -81,6 +87,11 @@ class Record:
             distance=None if source is None else slot.index - source.index,
             distance_ns=None if source is None else slot.log_stamp_ns - source.log_stamp_ns,
         )  # fmt: skip
+        if self.calibration is not None and result.labels is not None and result.confidence is not None:
+            self.calibration.update(
+                truth, result.labels, outcome=result.outcome, confidence=result.confidence,
+                uncertainty=result.uncertainty,
+            )  # fmt: skip
 
     def _slot(self, index: int) -> Slot:
         return self._slots[index - self._slots[0].index]

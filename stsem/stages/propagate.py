@@ -1,13 +1,14 @@
 """Propagate: labels for a frame from a finished keyframe. One more method is one class and one table row."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from stsem.frame import Frame, Segmentation
 from stsem.geometry.homography import Homography
-from stsem.geometry.warp import warp_labels, warp_onto
+from stsem.geometry.warp import warp_confidence, warp_labels, warp_onto
 from stsem.stages.keyframe import Keyframe
 
 
@@ -21,6 +22,8 @@ class Propagation(Protocol):
     def propagate(self, keyframe: Keyframe, frame: Frame, homography: Homography | None) -> Segmentation:
         """Labels for `frame` at the size of its image; NO_LABEL where the method has nothing to say.
 
+        The confidence of a label moves with it; maps of uncertainty do not: they are about the keyframe.
+
         Args:
             keyframe: a finished keyframe.
             frame: the frame to label.
@@ -29,16 +32,18 @@ class Propagation(Protocol):
 
 
 class Hold:
-    """Copies the keyframe's labels: what not predicting at all scores."""
+    """Copies the keyframe's labels and their confidence: what not predicting at all scores."""
 
     needs_homography = False
 
     def propagate(self, keyframe: Keyframe, frame: Frame, homography: Homography | None) -> Segmentation:
         """The keyframe's labels as they are, by nearest neighbour if the image size changed."""
-        labels = keyframe.segmentation.labels
-        if labels.shape == frame.image.shape[:2]:
-            return Segmentation(labels)
-        return Segmentation(warp_labels(labels, _stretch(labels.shape, frame.size), frame.size))
+        held = replace(keyframe.segmentation, uncertainty=None)
+        if held.labels.shape == frame.image.shape[:2]:
+            return held
+        H = _stretch(held.labels.shape, frame.size)
+        confidence = None if held.confidence is None else warp_confidence(held.confidence, H, frame.size)
+        return Segmentation(warp_labels(held.labels, H, frame.size), confidence)
 
 
 class HomographyWarp:
@@ -55,7 +60,12 @@ class HomographyWarp:
         held = Hold().propagate(keyframe, frame, None)
         if homography is None:
             return held
-        return Segmentation(warp_onto(held.labels, keyframe.segmentation.labels, homography.H))
+        labels, confidence = keyframe.segmentation.labels, keyframe.segmentation.confidence
+        if held.confidence is None or confidence is None:
+            return Segmentation(warp_onto(held.labels, labels, homography.H))
+        return Segmentation(
+            warp_onto(held.labels, labels, homography.H), warp_onto(held.confidence, confidence, homography.H)
+        )
 
 
 PROPAGATIONS: dict[str, Callable[[], Propagation]] = {"hold": Hold, "homography": HomographyWarp}

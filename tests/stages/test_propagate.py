@@ -10,6 +10,7 @@ from stsem.frame import Frame, Segmentation
 from stsem.geometry.homography import Homography
 from stsem.stages.keyframe import Keyframe
 from stsem.stages.propagate import PROPAGATIONS, Hold, HomographyWarp
+from stsem.uncertainty import Uncertainty
 
 WIDTH, HEIGHT = 20, 14
 
@@ -92,3 +93,21 @@ def test_table(name: str, needs: bool) -> None:
     """What the command line offers, and what each asks of the register stage."""
     assert PROPAGATIONS[name]().needs_homography is needs
     assert set(PROPAGATIONS) == {"hold", "homography"}
+
+
+@pytest.mark.parametrize("method", PROPAGATIONS)
+@pytest.mark.parametrize("homography", [None, shift(3, -2)])
+@pytest.mark.parametrize("grown", [1, 2])
+def test_confidence_stays_with_its_label(method: str, homography: Homography | None, grown: int) -> None:
+    """Coded so that it tells the label, it still does after the move; maps of uncertainty do not come along."""
+    labels = picture()
+    said = Uncertainty(("entropy",), np.zeros((1, HEIGHT, WIDTH), np.uint8), 5)
+    source = Keyframe(0, 0, Segmentation(labels, labels / np.float32(256), said))
+    answer = PROPAGATIONS[method]().propagate(source, frame(grown * WIDTH, grown * HEIGHT), homography)
+    assert answer.confidence is not None
+    assert answer.confidence.dtype == np.float32
+    np.testing.assert_array_equal(answer.confidence * 256, answer.labels)
+    assert answer.uncertainty is None
+    plain = PROPAGATIONS[method]().propagate(keyframe(labels), frame(grown * WIDTH, grown * HEIGHT), homography)
+    assert plain.confidence is None
+    np.testing.assert_array_equal(plain.labels, answer.labels)
