@@ -76,30 +76,37 @@ def _paper(how: str) -> Paper:
     )
 
 
-def _spatial(depth: int, classes: int, width: float) -> OneStream:
-    return OneStream(ResNetSpec(depth, width), classes)
+Backbone = Callable[[float], ResNetSpec]
+"""A backbone of a width factor."""
 
 
-def _temporal(depth: int, classes: int, width: float) -> OneStream:
-    return OneStream(ResNetSpec(depth, width), classes, stream="difference")
+def _spatial(backbone: Backbone, classes: int, width: float) -> OneStream:
+    return OneStream(backbone(width), classes)
 
 
-def _two(make: Callable[..., SegmentationNetwork], depth: int, classes: int, *widths: float) -> SegmentationNetwork:
-    return make(*(ResNetSpec(depth, width) for width in widths), classes)
+def _temporal(backbone: Backbone, classes: int, width: float) -> OneStream:
+    return OneStream(backbone(width), classes, stream="difference")
 
 
-def _pspnets(depth: int) -> dict[str, Row]:
+def _two(
+    make: Callable[..., SegmentationNetwork], backbone: Backbone, classes: int, *widths: float
+) -> SegmentationNetwork:
+    return make(*map(backbone, widths), classes)
+
+
+def _pspnets(depth: int, *, deep_stem: bool = True) -> dict[str, Row]:
     fusions: dict[str, tuple[str, Callable[..., SegmentationNetwork]]] = {
         "sum": ("prediction SUM", partial(PredictionFusion, fuse=prediction_sum)),
         "max": ("prediction MAX", partial(PredictionFusion, fuse=prediction_max)),
         "feature-sum": ("feature map SUM", partial(FeatureFusion, join="sum")),
         "feature-concat": ("feature map concatenation", partial(FeatureFusion, join="concat")),
     }
+    backbone = partial(ResNetSpec, depth, deep_stem=deep_stem)
     rows = {
-        "spatial": Row(_PSPNET, partial(_spatial, depth)),
-        "temporal": Row(_paper("temporal stream"), partial(_temporal, depth)),
+        "spatial": Row(_PSPNET, partial(_spatial, backbone)),
+        "temporal": Row(_paper("temporal stream"), partial(_temporal, backbone)),
     }
-    rows |= {name: Row(_paper(how), partial(_two, make, depth), 2) for name, (how, make) in fusions.items()}
+    rows |= {name: Row(_paper(how), partial(_two, make, backbone), 2) for name, (how, make) in fusions.items()}
     return {f"pspnet-r{depth}-{name}": row for name, row in rows.items()}
 
 
@@ -120,6 +127,10 @@ ZOO: dict[str, Row] = {
 }  # fmt: skip
 ALIASES = {f"pspnet-r{depth}": f"pspnet-r{depth}-sum" for depth in (18, 50, 101)}
 """The paper's best fusion needs no name."""
+PLAIN_STEMS = {
+    f"{name}-7x7": row for depth in (18, 50, 101) for name, row in _pspnets(depth, deep_stem=False).items()
+}  # fmt: skip
+"""The same with one 7x7 convolution in front, as He et al. and torchvision have it, for weights of such a ResNet."""
 
 
 def build(name: str, classes: int) -> SegmentationNetwork:
@@ -139,10 +150,10 @@ def build(name: str, classes: int) -> SegmentationNetwork:
 def find(name: str) -> tuple[Row, tuple[float, ...]]:
     """The row of a name, and its width factors. Raises UsageError as `build` does."""
     base, suffix = _NAME.fullmatch(name).groups()  # type: ignore[union-attr]  # it matches anything
-    row = ZOO.get(ALIASES.get(base, base))
+    row = (ZOO | PLAIN_STEMS).get(ALIASES.get(base, base))
     if row is None:
-        raise UsageError(f"There is no architecture {name!r}; choose one of {', '.join((*ALIASES, *ZOO))}, "
-                         "with -w4 at the end for 4/16 of the channels.")  # fmt: skip
+        raise UsageError(f"There is no architecture {name!r}; choose one of {', '.join((*ALIASES, *ZOO))}, with -7x7 "
+                         "behind a PSPNet for that stem, and -w4 at the end for 4/16 of the channels.")  # fmt: skip
     widths = tuple(int(part) / SIXTEENTHS for part in suffix.split("-w")[1:])
     if len(widths) > row.widths or 0.0 in widths:
         raise UsageError(f"The architecture {name!r} cannot be: {base} takes at most {row.widths} width(s), above 0.")
