@@ -11,14 +11,15 @@ Progress = Callable[[int, int], None]
 """Called with (done, total), in whatever unit."""
 
 
-def _is_terminal() -> bool:
+def is_terminal() -> bool:
+    """Whether stderr can show a bar."""
     return sys.stderr.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
 @contextmanager
 def progress(label: str) -> Iterator[Progress]:
     """A bar named `label` for the duration of the block; its value is the function to report with."""
-    if not _is_terminal():
+    if not is_terminal():
         yield lambda done, total: None
         return
     from rich.console import Console

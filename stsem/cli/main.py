@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from stsem import __version__
-from stsem.cli import cache, convert, costs, export, gate, inspect, quantize, replay, synth
+from stsem.cli import cache, convert, costs, export, gate, inspect, quantize, replay, synth, train
 from stsem.cli.launch import launch
 from stsem.errors import EXIT_USAGE
 
@@ -24,6 +24,7 @@ app.command("convert", help=convert.HELP)(convert.convert)
 app.command("export", help=export.HELP)(export.export)
 app.command("quantize", help=quantize.HELP)(quantize.quantize)
 app.command("synth", help=synth.HELP)(synth.synth)
+app.command("train", help=train.HELP)(train.train)
 app.add_typer(costs.app, name="costs")
 app.add_typer(cache.app, name="cache")
 

@@ -2,17 +2,29 @@
 
 import csv
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from stsem.aside import aside
 from stsem.errors import OutputError
-from stsem.train.loop import Record
 from stsem.train.recipe import Recipe
 
 COLUMNS = ("iteration", "loss", "rate", "validation_miou", "validation_pixel_accuracy")
+
+
+@dataclass
+class Record:
+    """What a training has seen.
+
+    Args:
+        losses: mean loss of every iteration.
+        validations: iteration -> (mIoU, pixel accuracy) of the averaged weights.
+    """
+
+    losses: list[float] = field(default_factory=list)
+    validations: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -56,3 +68,19 @@ def write_csv(path: Path, rows: list[Point]) -> None:
         unfinished.replace(path)
     except OSError as err:
         raise OutputError(f"The curves {path} cannot be written: {err.strerror or err}.") from err
+
+
+def read_csv(path: Path) -> list[Point]:
+    """What `write_csv` wrote; nothing where there is no such file."""
+    if not path.is_file():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        return [
+            Point(int(row["iteration"]), float(row["loss"]), float(row["rate"]), _scores(row))
+            for row in csv.DictReader(file)
+        ]
+
+
+def _scores(row: dict[str, str]) -> tuple[float, float] | None:
+    miou, accuracy = row["validation_miou"], row["validation_pixel_accuracy"]
+    return (float(miou), float(accuracy)) if miou else None

@@ -60,8 +60,9 @@ class Job:
 
     @property
     def numbers(self) -> Recipe:
-        """The recipe of this stage."""
-        return self.recipe.fused() if self.stage == "fused" else self.recipe
+        """The recipe of this stage: where two trained streams are joined, with its `fused_` numbers."""
+        joined = self.stage == "fused" and {"colour", "difference"} <= self.starts.keys()
+        return self.recipe.fused() if joined else self.recipe
 
     def identity(self) -> dict[str, Any]:
         """What decides the weights, beside the data and the weights to begin with, as plain values."""

@@ -3,7 +3,6 @@
 import copy
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from typing import Any
 
 import torch
@@ -16,6 +15,7 @@ from stsem.errors import TrainingError
 from stsem.inference.sidecar import Sidecar
 from stsem.models.network import SegmentationNetwork
 from stsem.train.augment import Augmentation, view
+from stsem.train.curves import Record
 from stsem.train.dataset import Pairs
 from stsem.train.dropout import begin_iteration, key_dropout
 from stsem.train.job import Machine
@@ -24,19 +24,6 @@ from stsem.train.recipe import Recipe
 from stsem.train.tensors import tensors
 
 Tensors = tuple[torch.Tensor, ...] | list[torch.Tensor]
-
-
-@dataclass
-class Record:
-    """What a training has seen.
-
-    Args:
-        losses: mean loss of every iteration.
-        validations: iteration -> (mIoU, pixel accuracy) of the averaged weights.
-    """
-
-    losses: list[float] = field(default_factory=list)
-    validations: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
 class Training:

@@ -9,7 +9,9 @@ from torch import nn
 from stsem import chance
 from stsem.errors import TrainingError
 from stsem.inference.sidecar import Sidecar
+from stsem.models.checkpoint import LoadedWeights, begin_with
 from stsem.models.network import SegmentationNetwork
+from stsem.models.pspnet import PSPNet
 from stsem.models.two_stream import OneStream, adapt_to_difference
 from stsem.train.augment import Augmentation, view
 from stsem.train.checkpoint import averaged_weights, read_checkpoint
@@ -38,23 +40,33 @@ def begin(network: SegmentationNetwork, job: Job, sidecar: Sidecar, pairs: Pairs
     """Give a network the weights that its stage begins with, in place.
 
     Raises:
-        TrainingError: weights that cannot be read or do not fit.
+        TrainingError, NetworkError: weights that cannot be read or do not fit.
     """
     taken: set[str] = set()
     if "weights" in job.starts:
-        taken |= _foreign(network, job)
+        taken |= set(given_weights(network, job, sidecar).matched)
     if job.stage == "difference" and "colour" in job.starts:
-        taken |= _difference_from_colour(network, job, sidecar, pairs)
-    if job.stage == "fused":
-        for stream in ("colour", "difference"):
-            if stream in job.starts:
-                taken |= _stream(network, job, stream)
+        taken |= _difference_from_colour(network, job, sidecar)
+    for stream in ("colour", "difference"):
+        if job.stage == "fused" and stream in job.starts:
+            taken |= _stream(network, job, stream)
+    stem = _difference_stem(network)
+    if taken and stem is not None and stem.get_buffer("1.num_batches_tracked") == 0:
+        settle(stem, job, sidecar, pairs)
     names = {name for name, _ in network.named_parameters()}
     return Begun(bool(taken), frozenset(names - taken) if taken else frozenset())
 
 
-def _foreign(network: SegmentationNetwork, job: Job) -> set[str]:
-    return _load(network, averaged_weights(read_checkpoint(job.starts["weights"])), job, "weights")
+def given_weights(network: SegmentationNetwork, job: Job, sidecar: Sidecar) -> LoadedWeights:
+    """Put the weights of a file from elsewhere into a network, in place. Raises NetworkError."""
+    scale = sidecar.difference.scale if sidecar.difference else None
+    return begin_with(network, job.starts["weights"], std=sidecar.std, scale=scale)
+
+
+def _difference_stem(network: SegmentationNetwork) -> nn.Sequential | None:
+    """Of the stream of that name, if there is one."""
+    stream = dict(network.named_children()).get("difference")
+    return stream.backbone.stem if isinstance(stream, PSPNet) else None
 
 
 def _stream(network: SegmentationNetwork, job: Job, stream: str) -> set[str]:
@@ -64,8 +76,8 @@ def _stream(network: SegmentationNetwork, job: Job, stream: str) -> set[str]:
     return _load(network, own, job, stream)
 
 
-def _difference_from_colour(network: SegmentationNetwork, job: Job, sidecar: Sidecar, pairs: Pairs) -> set[str]:
-    """The temporal stream from a spatial one: its weights, its first convolution and its first statistics adapted."""
+def _difference_from_colour(network: SegmentationNetwork, job: Job, sidecar: Sidecar) -> set[str]:
+    """The temporal stream from a spatial one: its weights, with the first convolution adapted."""
     if not isinstance(network, OneStream) or sidecar.difference is None:
         raise TrainingError(f"The architecture {job.architecture} has no difference stream that could begin with a "
                             "colour stream's weights.")  # fmt: skip
@@ -73,7 +85,6 @@ def _difference_from_colour(network: SegmentationNetwork, job: Job, sidecar: Sid
     renamed = {f"difference.{name.removeprefix('colour.')}": value for name, value in weights.items()}
     taken = _load(network, renamed, job, "colour")
     adapt_to_difference(network.network, std=sidecar.std, scale=sidecar.difference.scale)
-    settle(network.network.backbone.stem, job, sidecar, pairs)
     return taken
 
 
