@@ -1,0 +1,248 @@
+"""The straight line of `stsem train`: plan, read, train stage by stage, export, say how to replay."""
+
+import math
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from stsem.classes import ClassSet
+from stsem.cli.console import note, progress
+from stsem.cli.recordings import check_once, recordings
+from stsem.cli.stagebar import drawn, shown, stopping_in_order
+from stsem.errors import TrainingStoppedError, UsageError
+from stsem.inference.network import Network
+from stsem.inference.sidecar import Difference, Sidecar
+from stsem.inference.threads import set_threads
+from stsem.models.network import SegmentationNetwork
+from stsem.models.zoo import build
+from stsem.replay.settings import parse_topics
+from stsem.train.dataset import Pairs
+from stsem.train.job import Job, Stage, stages_of
+from stsem.train.machine import machine
+from stsem.train.publish import load_checkpoint, publish
+from stsem.train.recipe import Recipe, find_recipe
+from stsem.train.sources import Reading, Source, classes_of, join, open_source
+from stsem.train.stages import train_stage
+from stsem.train.starts import given_weights
+from stsem.train.vocabulary import read_class_map
+
+MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+"""Of ImageNet's images, RGB in 0..1: what weights from elsewhere expect."""
+DIFFERENCE_SCALE = 4.0
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The flags of `stsem train`, as typed."""
+
+    data: tuple[str, ...]
+    validation: tuple[str, ...]
+    out: Path
+    architecture: str
+    weights: Path | None
+    size: str | None
+    classes: Path | None
+    class_map: Path | None
+    topics: tuple[str, ...]
+    recipe: str
+    stages: str | None
+    iterations: int | None
+    batch: int | None
+    rate: float | None
+    crop: str | None
+    seed: int
+    device: str
+    precision: str
+    workers: int
+
+
+@dataclass(frozen=True, eq=False)
+class Read:
+    """The data, opened.
+
+    Args:
+        classes: of the network.
+        pairs, validation: with labels in ids of `classes`.
+        size: (width, height) of the first image.
+        logs: names of the training and validation data, for the closing line.
+    """
+
+    classes: ClassSet
+    pairs: Pairs
+    validation: Pairs | None
+    size: tuple[int, int]
+    logs: tuple[str, ...]
+
+
+def train_all(wanted: Wanted) -> int:
+    """Train, or go on; every error is one sentence.
+
+    Raises:
+        StsemError: something cannot be.
+    """
+    stages = _stages(wanted)
+    job = Job(wanted.architecture, "fused", _sidecar_like(wanted), _recipe(wanted), wanted.seed,
+              machine=machine(wanted.device, wanted.precision, wanted.workers))  # fmt: skip
+    set_threads(1)
+    try:
+        read = _read(wanted, stages[-1][1])
+        job = _fitted(wanted, job, read, stages[-1][1])
+        checkpoint = _train(wanted, job, read, stages)
+        note("Exporting the network.")
+        published = _publish(wanted, job, checkpoint, stages[-1][1])
+    except KeyboardInterrupt as err:
+        raise TrainingStoppedError(f"Stopped; the same command goes on from what is in {wanted.out}.") from err
+    except TrainingStoppedError as err:
+        raise TrainingStoppedError(f"{err} The same command goes on from there.") from err
+    _print(published, read)
+    return 0
+
+
+def _stages(wanted: Wanted) -> tuple[tuple[Stage, str], ...]:
+    """Stage and architecture, of those that were asked for."""
+    known = stages_of(wanted.architecture)
+    if wanted.stages is None:
+        return known
+    names = [name.strip() for name in wanted.stages.split(",")]
+    chosen = tuple(row for row in known if row[0] in names)
+    if len(chosen) != len(names):
+        raise UsageError(f"--stages {wanted.stages} cannot be: {wanted.architecture} has "
+                         f"{', '.join(stage for stage, _ in known)}.")  # fmt: skip
+    return chosen
+
+
+def _recipe(wanted: Wanted) -> Recipe:
+    """The recipe with what the flags say; the fused stage changes in proportion."""
+    recipe = find_recipe(wanted.recipe)
+    if wanted.iterations is not None:
+        fused = round(wanted.iterations * recipe.fused_iterations / recipe.iterations)
+        recipe = replace(recipe, iterations=wanted.iterations, fused_iterations=max(1, fused))
+    if wanted.batch is not None:
+        recipe = replace(recipe, batch=wanted.batch, fused_batch=wanted.batch)
+    if wanted.rate is not None:
+        recipe = replace(recipe, rate=wanted.rate, fused_rate=wanted.rate * recipe.fused_rate / recipe.rate)
+    if wanted.crop is not None:
+        recipe = replace(recipe, crop=_size(wanted.crop, "--crop"))
+    return recipe
+
+
+def _size(text: str, flag: str) -> tuple[int, int]:
+    width, times, height = text.partition("x")
+    if not (times and text.isascii() and width.isdigit() and height.isdigit() and int(width) and int(height)):
+        raise UsageError(f"{flag} takes WIDTHxHEIGHT, such as 329x185, but {text!r} came.")
+    return int(width), int(height)
+
+
+def _sidecar_like(wanted: Wanted) -> Sidecar:
+    """Before the data is known: one class, any size."""
+    size = (1, 1) if wanted.size is None else _size(wanted.size, "--size")
+    return Sidecar(size, MEAN, STD, ClassSet(("unknown",)), Difference(DIFFERENCE_SCALE))
+
+
+def _read(wanted: Wanted, architecture: str) -> Read:
+    check_once((*wanted.data, *wanted.validation))
+    class_map = read_class_map(wanted.class_map) if wanted.class_map else {}
+    depth = "depth" in build(architecture, 2).inputs
+    sources, others = (_open_all(wanted, given, depth=depth) for given in (wanted.data, wanted.validation))
+    classes = classes_of(sources, class_map)
+    prints = {one.pairs.fingerprint for one in sources}
+    if twice := [one.name for one in others if one.pairs.fingerprint in prints]:
+        raise UsageError(f"{twice[0]} is to be trained on and validated with; validate with other data.")
+    if not others:
+        note("No validation data was given (--validation): nothing will tell whether the network knows more than "
+             "what it was trained on.")  # fmt: skip
+    pairs = join(sources, classes, class_map)
+    note(f"{len(pairs)} pairs of {len(sources)} data sets, {len(classes)} classes.")
+    return Read(classes, pairs, join(others, classes, class_map) if others else None, sources[0].size,
+                tuple(one.name for one in (*others, *sources)))  # fmt: skip
+
+
+def _open_all(wanted: Wanted, given: Sequence[str], *, depth: bool) -> list[Source]:
+    sources = []
+    for parts in recordings(given):
+        with progress(f"Decoding {Path(parts[0]).name}") as step:
+            how = Reading(wanted.out / "frames", wanted.classes, depth, parse_topics(list(wanted.topics)) or None, step)
+            sources.append(open_source(parts, how))
+        for line in sources[-1].notes:
+            note(f"Note: {line}")
+    return sources
+
+
+def _fitted(wanted: Wanted, job: Job, read: Read, architecture: str) -> Job:
+    """The job with the classes of the data, and with sizes that suit the network."""
+    network, recipe = build(architecture, len(read.classes)), job.recipe
+    crop = _nearest(network, recipe.crop)
+    if crop != recipe.crop:
+        note(f"The crop {recipe.crop[0]}x{recipe.crop[1]} becomes {crop[0]}x{crop[1]}: the sides of {architecture} are "
+             f"{network.side_rule}.")  # fmt: skip
+    size = job.sidecar.size if wanted.size else _nearest(network, _usual_size(recipe, read.size))
+    if size != _nearest(network, size):
+        raise UsageError(f"--size {wanted.size} does not fit {architecture}, whose sides are {network.side_rule}; use "
+                         "{}x{}.".format(*_nearest(network, size)))  # fmt: skip
+    if recipe.pretrained and wanted.weights is None:
+        note(f"The recipe {recipe.name} presumes weights that were trained elsewhere (--weights FILE), and none were "
+             "given: expect little of it, or take --recipe scratch.")  # fmt: skip
+    return replace(
+        job, recipe=replace(recipe, crop=crop), sidecar=replace(job.sidecar, size=size, classes=read.classes)
+    )
+
+
+def _nearest(network: SegmentationNetwork, size: tuple[int, int]) -> tuple[int, int]:
+    return network.nearest_side(size[0]), network.nearest_side(size[1])
+
+
+def _usual_size(recipe: Recipe, image: tuple[int, int]) -> tuple[int, int]:
+    """The image at the middle of the scales that the network is trained on."""
+    middle = math.sqrt(recipe.scales[0] * recipe.scales[1])
+    width = image[0] * middle if recipe.of_image else recipe.crop[0] * middle
+    return round(width), round(width * image[1] / image[0])
+
+
+def _train(wanted: Wanted, job: Job, read: Read, stages: Sequence[tuple[Stage, str]]) -> Path:
+    """The checkpoint of the last stage."""
+    done: dict[str, Path] = {}
+    for stage, architecture in stages:
+        starts = _starts(wanted, stage, architecture, done, dict(stages))
+        this = replace(job, architecture=architecture, stage=stage, starts=starts)
+        if "weights" in starts:
+            network = build(architecture, len(read.classes))
+            for line in given_weights(network, this, this.sidecar.for_inputs(network.inputs)).lines():
+                note(f"{wanted.weights}: {line}")
+        folder = wanted.out / stage
+        with shown(this) as report, stopping_in_order() as stopping, drawn(folder) as draw:
+            done[stage] = train_stage(
+                this, read.pairs, read.validation, folder, lambda now: draw(report(now)), stopping
+            )
+    return done[stages[-1][0]]
+
+
+def _starts(
+    wanted: Wanted, stage: Stage, architecture: str, done: dict[str, Path], names: dict[Stage, str]
+) -> dict[str, Path]:
+    """What a stage begins with: the stages before it, else the weights that were given."""
+    if stage == "fused" and {"colour", "difference"} <= done.keys():
+        return dict(done)
+    if stage == "difference" and "colour" in done:
+        if names["colour"].replace("-spatial", "-temporal") == architecture:
+            return dict(done)
+        note("The difference stream has another width than the colour stream, so it begins with random weights.")
+        return {}
+    return {} if wanted.weights is None else {"weights": wanted.weights}
+
+
+def _publish(wanted: Wanted, job: Job, checkpoint: Path, architecture: str) -> Network:
+    network = load_checkpoint(checkpoint, len(job.sidecar.classes))
+    words = f"{architecture}, trained with recipe {job.recipe.name}, seed {job.seed}"
+    return publish(
+        network, replace(job.sidecar.for_inputs(network.inputs), note=words), wanted.out / f"{architecture}.onnx"
+    )
+
+
+def _print(published: Network, read: Read) -> None:
+    width, height = published.size
+    size = published.path.stat().st_size / 1e6
+    log = shlex.quote(next((name for name in read.logs if name.endswith(".mcap")), "LOG"))
+    sys.stdout.write(f"Network: {published.path} ({size:.1f} MB, {len(read.classes)} classes, {width}x{height})\n"
+                     f"Replay:  stsem-replay {log} --model {shlex.quote(str(published.path))}\n")  # fmt: skip

@@ -1,0 +1,119 @@
+"""From the classes of the data to those of the network."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from stsem.classes import NO_LABEL, ClassSet, Labels, normalised
+from stsem.errors import ClassTableError
+from stsem.train.dataset import Pair, Pairs, fingerprint
+
+ClassMap = Mapping[str, str]
+"""Name in the data -> name in the network; "" for pixels that are not to be learned. Other names stay."""
+
+
+def read_class_map(path: Path) -> dict[str, str]:
+    """A class map from TOML: `"office chair" = "chair"`.
+
+    Raises:
+        ClassTableError: it cannot be read or is none.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as err:
+        raise ClassTableError(f"The class map {path} cannot be read: {err.strerror or err}.") from err
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
+        raise ClassTableError(f"The class map {path} is not valid TOML: {err}.") from err
+    if bad := [key for key, value in table.items() if not isinstance(value, str)]:
+        raise ClassTableError(f'The class map {path} gives no class name for {bad[0]!r}; write it as name = "name".')
+    return table
+
+
+def network_classes(data: ClassSet, class_map: ClassMap) -> ClassSet:
+    """The classes that a network learns from data of `data`: their new names, in order, each once.
+
+    Raises:
+        ClassTableError: the map names a class that is not there, or leaves none.
+    """
+    for name in class_map:
+        if data.find(name) is None:
+            raise ClassTableError(f"The class map names {name!r}, which is none of {', '.join(data.names)}.")
+    kept: dict[str, int] = {}
+    for number, name in enumerate(_renamed(data, class_map)):
+        if name and normalised(name) not in map(normalised, kept):
+            kept[name] = number
+    return ClassSet(tuple(kept), tuple(data.colours[number] for number in kept.values()) if data.colours else ())
+
+
+def lookup(data: ClassSet, network: ClassSet, class_map: ClassMap, where: str) -> Labels:
+    """(256,) uint8: the network's id of each of the data's, NO_LABEL for what is not to be learned.
+
+    Raises:
+        ClassTableError: `where` has a class that the network does not have and the map does not name.
+    """
+    table = np.full(256, NO_LABEL, np.uint8)
+    names = _renamed(data, class_map)
+    if unknown := [name for name in names if name and network.find(name) is None]:
+        raise ClassTableError(
+            f"{where} has classes that the first data does not have ({', '.join(unknown)}); give each another name, or "
+            'none (""), in --class-map.'
+        )
+    for number, name in enumerate(names):
+        found = network.find(name) if name else None
+        table[number] = NO_LABEL if found is None else found
+    return table
+
+
+def _renamed(data: ClassSet, class_map: ClassMap) -> list[str]:
+    new = {normalised(name): to for name, to in class_map.items()}
+    return [new.get(normalised(name), name) for name in data.names]
+
+
+class Translated:
+    """Pairs with their labels looked up in a table.
+
+    Args:
+        pairs: in ids of their own.
+        table: (256,) uint8, from `lookup`.
+    """
+
+    def __init__(self, pairs: Pairs, table: Labels) -> None:
+        self._pairs, self._table = pairs, table
+
+    @property
+    def fingerprint(self) -> str:
+        """Of the pairs and the table."""
+        return fingerprint([self._pairs.fingerprint, self._table.tobytes().hex()])
+
+    def __len__(self) -> int:
+        return len(self._pairs)
+
+    def pair(self, index: int) -> Pair:
+        """The pair at `index`."""
+        pair = self._pairs.pair(index)
+        return Pair(pair.images, np.stack([np.asarray(cv2.LUT(x, self._table), np.uint8) for x in pair.labels]),
+                    pair.depths)  # fmt: skip
+
+
+class Joined:
+    """Several data sets, one behind the other."""
+
+    def __init__(self, parts: Sequence[Pairs]) -> None:
+        self._parts = tuple(parts)
+        self._ends = np.cumsum([len(part) for part in parts])
+
+    @property
+    def fingerprint(self) -> str:
+        """Of all parts in their order."""
+        return fingerprint(part.fingerprint for part in self._parts)
+
+    def __len__(self) -> int:
+        return int(self._ends[-1])
+
+    def pair(self, index: int) -> Pair:
+        """The pair at `index`."""
+        part = int(np.searchsorted(self._ends, index, side="right"))
+        return self._parts[part].pair(index - int(self._ends[part - 1] if part else 0))
