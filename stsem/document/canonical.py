@@ -14,6 +14,8 @@ from stsem.errors import UsageError
 
 OUTSIDE_DIGEST = ("host", "digest")
 """Top-level keys that the digest leaves out."""
+_ADDED = ("calibration", "error_detection")
+"""Parts of a run that came after baselines were first kept: where they are empty, older results are the same."""
 _RESULTS = ("schema_version", "state", "accuracy_state", "input", "runs", "comparison", "more_comparisons")
 
 
@@ -55,6 +57,8 @@ def results_digest(document: Document) -> str:
     A gate asks for equal results across installations, where `digest` differs by the version of any package.
     """
     kept = {key: value for key, value in as_json(document).items() if key in _RESULTS}
+    runs = [run.model_dump(mode="json") for run in document.runs]
+    kept["runs"] = [{key: value for key, value in run.items() if value or key not in _ADDED} for run in runs]
     return hashlib.sha256(canonical(kept)).hexdigest()
 
 

@@ -8,6 +8,7 @@ from typing import Literal, Self
 from pydantic import Field, JsonValue, model_validator
 
 from stsem.document.accuracy import Consistency, Coverage, DistanceRow, DistanceSummary, Loss, Score
+from stsem.document.calibration import Calibration, ErrorDetection
 from stsem.document.origin import Host, Identity, Input
 from stsem.document.part import Count, Number, Part, Share
 from stsem.document.timing import Latency, Outcomes, Throughput
@@ -97,6 +98,10 @@ class Run(Part):
     """Mean and minimum over the distances that have enough frames."""
     consistency: Consistency | None = None
     """Temporal consistency of the answers."""
+    calibration: dict[str, Calibration] = Field(default_factory=dict)
+    """Whether confidence is true: `segmented`, `propagated` of the offline pass; `delivered`, of the real-time run."""
+    error_detection: ErrorDetection | None = None
+    """How well measures of uncertainty find the wrong pixels of segmented frames; null where nothing states any."""
     latency_ms: Latency | None = None
     """Latencies of the answered frames; null without a clock."""
     throughput: Throughput | None = None

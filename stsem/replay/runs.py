@@ -17,6 +17,7 @@ from stsem.metrics.scorecard import Accuracy
 from stsem.metrics.throughput import throughput
 from stsem.replay import accuracy, timing
 from stsem.replay.build import Model
+from stsem.replay.calibration import calibration, error_detection
 from stsem.replay.config import RunConfig
 from stsem.replay.costing import Costing
 from stsem.replay.engine import Replayed
@@ -90,6 +91,7 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
     streaming = None if found.clocked is None else found.clocked.streaming
     offline = None if found.offline is None else found.offline.own
     classes = context.model.classes
+    measured = any(accuracies is not None and accuracies.measured for accuracies in (found.offline, found.clocked))
     return Run(
         mode=run.mode.name,
         clock=config.clock,
@@ -110,6 +112,8 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
         strata=accuracy.strata(found.offline, classes),
         by_distance=accuracy.distances(() if found.offline is None else found.offline.by_distance),
         consistency=accuracy.consistency(record.consistency),
+        calibration=calibration(run) if measured else {},
+        error_detection=error_detection(run) if measured else None,
         by_distance_summary=accuracy.distance_summary(
             None if found.offline is None else found.offline.distance_summary
         ),
