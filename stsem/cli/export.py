@@ -9,11 +9,13 @@ from stsem.cli.launch import verb
 
 if TYPE_CHECKING:
     from stsem.inference.sidecar import Sidecar
+    from stsem.models.network import SegmentationNetwork
 
 HELP = """Export a network to an ONNX file with its sidecar, and check it against torch (needs the extra 'train').
 
     stsem export network.onnx --checkpoint training.pt --sidecar like.toml
     stsem export network.onnx --architecture pspnet-r50 --sidecar like.toml   (random weights, for timing)
+    stsem export network.onnx --architecture pspnet-r50-spatial --weights semseg.pth --sidecar like.toml
     stsem export --list                                                       (the architectures there are)
 """
 
@@ -29,7 +31,11 @@ def export(
     ] = None,
     checkpoint: Annotated[Path | None, typer.Option("--checkpoint", help="Weights and architecture.")] = None,
     architecture: Annotated[
-        str | None, typer.Option("--architecture", metavar="NAME", help="Random weights of a network by name.")
+        str | None, typer.Option("--architecture", metavar="NAME", help="A network by name; random weights.")
+    ] = None,
+    weights: Annotated[
+        Path | None,
+        typer.Option("--weights", help="Weights for --architecture: of hszhao/semseg, a torchvision ResNet, or ours."),
     ] = None,
     passes: Annotated[
         int,
@@ -45,7 +51,6 @@ def export(
 
     try:
         from stsem.models.cost import table
-        from stsem.models.zoo import build
         from stsem.train.publish import load_checkpoint, publish
     except ModuleNotFoundError as err:
         raise MissingExtraError("train", "Exporting a network") from err
@@ -54,6 +59,8 @@ def export(
         return 0
     if out is None or sidecar is None or (checkpoint is None) == (architecture is None):
         raise UsageError("stsem export takes OUT.onnx, --sidecar, and either --checkpoint or --architecture.")
+    if weights is not None and architecture is None:
+        raise UsageError("--weights needs --architecture, the network that they are for.")
     if out.suffix != ".onnx":
         raise UsageError(f"The network is written as {out}, but its name must end in .onnx.")
     described = _described(sidecar)
@@ -61,12 +68,27 @@ def export(
     if checkpoint is not None:
         network = load_checkpoint(checkpoint, classes)
     else:
-        network = build(architecture or "", classes).eval()
+        network = _built(architecture or "", weights, described)
     published = publish(network, described, out, passes=passes)
     width, height = published.size
     print(f"Network: {out} ({out.stat().st_size / 1e6:.1f} MB, {classes} classes, {width}x{height})")
     print(f"Replay:  stsem-replay LOG --model {out}")
     return 0
+
+
+def _built(architecture: str, weights: Path | None, sidecar: "Sidecar") -> "SegmentationNetwork":
+    """A network by name, with random weights or those of a file, whose fate is told."""
+    from stsem.models.checkpoint import begin_with
+    from stsem.models.zoo import build
+
+    network = build(architecture, len(sidecar.classes)).eval()
+    if weights is not None:
+        difference = sidecar.difference
+        loaded = begin_with(network, weights, std=sidecar.std, scale=difference.scale if difference else None)
+        print("Weights: " + "\n         ".join(loaded.lines()))
+        if not loaded.complete:
+            print("         What was not taken is random: train the network before you judge it.")
+    return network
 
 
 def _described(path: Path) -> "Sidecar":

@@ -14,7 +14,7 @@ from stsem.frame import Frame
 from stsem.inference.inferencer import Inferencer
 from stsem.inference.network import load_network
 from stsem.inference.sidecar import Difference, Sidecar, render
-from stsem.models.zoo import ZOO
+from stsem.models.zoo import ZOO, build
 
 from .conftest import Cli
 
@@ -43,6 +43,25 @@ def test_a_network_with_uncertainty(cli: Cli, sidecar: Path, tmp_path: Path) -> 
     assert all(port.shape == [1, 41, 89] for port in outputs)
 
 
+def test_weights_from_elsewhere(cli: Cli, sidecar: Path, tmp_path: Path) -> None:
+    """What was taken, and what was not."""
+    weights, out = tmp_path / "colour.pt", tmp_path / "net.onnx"
+    arguments = ("--architecture", "pspnet-r18-spatial-w1", "--weights", weights, "--sidecar", sidecar)
+    weights.write_text("no weights")
+    assert "it is text; give what torch.save" in cli("export", out, *arguments).sentence
+    torch = pytest.importorskip("torch")
+    torch.manual_seed(0)
+    state = build("pspnet-r18-spatial-w1", 3).state_dict()
+    del state["colour.head.4.bias"]
+    torch.save({"state_dict": {f"module.{name}": value for name, value in state.items()}}, weights)
+    ran = cli("export", out, *arguments)
+    assert (ran.code, ran.err) == (0, "")
+    lines = [line.strip() for line in ran.out.splitlines()]
+    assert lines[0] == "Weights: 143 of 144 taken (stsem)"
+    assert lines[1] == "1 not in the file, unchanged: colour.head.4.bias"
+    assert "train the network before you judge it" in lines[2]
+
+
 def test_the_list(cli: Cli) -> None:
     """Every name, and sizes that are published."""
     ran = cli("export", "--list")
@@ -56,6 +75,7 @@ def test_the_list(cli: Cli) -> None:
     ((), "takes OUT.onnx, --sidecar, and either"),
     (("net.onnx", "--sidecar", "like.toml"), "takes OUT.onnx, --sidecar, and either"),
     (("net.pt", "--sidecar", "like.toml", "--architecture", "pspnet-r18"), "must end in .onnx"),
+    (("net.onnx", "--sidecar", "like.toml", "--checkpoint", "a.pt", "--weights", "b.pt"), "--weights needs --arch"),
     (("net.onnx", "--sidecar", "none.toml", "--architecture", "pspnet-r18"), "none.toml cannot be read"),
     (("net.onnx", "--sidecar", "like.toml", "--architecture", "pspnet"), "no architecture 'pspnet'"),
     (("net.onnx", "--sidecar", "like.toml", "--architecture", "pspnet-r18-w1", "--uncertainty", "1"), "2 or more"),

@@ -152,8 +152,12 @@ def test_the_difference_stream_starts_from_the_colour_stream(tmp_path: Path) -> 
 def test_our_own_checkpoints(tmp_path: Path) -> None:
     """The running mean of a training is taken, not its last state; one stream alone goes into its stream of two."""
     spatial, mean = build("pspnet-r18-spatial-w2", CLASSES), build("pspnet-r18-spatial-w2", CLASSES)
-    state = {"architecture": "pspnet-r18-spatial-w2", "iteration": 7, "network": spatial.state_dict(),
-             "mean": {"n_averaged": torch.tensor(3), **{f"module.{k}": v for k, v in mean.state_dict().items()}}}  # fmt: skip
+    state = {
+        "architecture": "pspnet-r18-spatial-w2",
+        "iteration": 7,
+        "network": spatial.state_dict(),
+        "mean": {"n_averaged": torch.tensor(3), **{f"module.{k}": v for k, v in mean.state_dict().items()}},
+    }
     path = tmp_path / "checkpoint.pt"
     torch.save(state, path)
     loaded = load_weights(spatial, path)
