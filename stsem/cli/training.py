@@ -2,7 +2,6 @@
 
 import math
 import shlex
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from stsem.errors import TrainingStoppedError, UsageError
 from stsem.inference.network import Network
 from stsem.inference.sidecar import Difference, Sidecar
 from stsem.inference.threads import set_threads
+from stsem.log.container.source import without_secrets
 from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
 from stsem.replay.settings import parse_topics
@@ -66,14 +66,12 @@ class Read:
         classes: of the network.
         pairs, validation: with labels in ids of `classes`.
         size: (width, height) of the first image.
-        logs: names of the training and validation data, for the closing line.
     """
 
     classes: ClassSet
     pairs: Pairs
     validation: Pairs | None
     size: tuple[int, int]
-    logs: tuple[str, ...]
 
 
 def train_all(wanted: Wanted) -> int:
@@ -96,7 +94,7 @@ def train_all(wanted: Wanted) -> int:
         raise TrainingStoppedError(f"Stopped; the same command goes on from what is in {wanted.out}.") from err
     except TrainingStoppedError as err:
         raise TrainingStoppedError(f"{err} The same command goes on from there.") from err
-    _print(published, read)
+    _print(published, wanted)
     return 0
 
 
@@ -117,8 +115,14 @@ def _recipe(wanted: Wanted) -> Recipe:
     """The recipe with what the flags say; the fused stage changes in proportion."""
     recipe = find_recipe(wanted.recipe)
     if wanted.iterations is not None:
-        fused = round(wanted.iterations * recipe.fused_iterations / recipe.iterations)
-        recipe = replace(recipe, iterations=wanted.iterations, fused_iterations=max(1, fused))
+        count = wanted.iterations
+        fused = round(count * recipe.fused_iterations / recipe.iterations)
+        recipe = replace(
+            recipe, iterations=count, fused_iterations=max(1, fused),
+            report_every=min(recipe.report_every, max(1, count // 20)),
+            checkpoint_every=min(recipe.checkpoint_every, max(1, count // 10)),
+            validate_every=min(recipe.validate_every, max(1, count // 5)),
+        )  # fmt: skip
     if wanted.batch is not None:
         recipe = replace(recipe, batch=wanted.batch, fused_batch=wanted.batch)
     if wanted.rate is not None:
@@ -155,8 +159,7 @@ def _read(wanted: Wanted, architecture: str) -> Read:
              "what it was trained on.")  # fmt: skip
     pairs = join(sources, classes, class_map)
     note(f"{len(pairs)} pairs of {len(sources)} data sets, {len(classes)} classes.")
-    return Read(classes, pairs, join(others, classes, class_map) if others else None, sources[0].size,
-                tuple(one.name for one in (*others, *sources)))  # fmt: skip
+    return Read(classes, pairs, join(others, classes, class_map) if others else None, sources[0].size)
 
 
 def _open_all(wanted: Wanted, given: Sequence[str], *, depth: bool) -> list[Source]:
@@ -240,9 +243,10 @@ def _publish(wanted: Wanted, job: Job, checkpoint: Path, architecture: str) -> N
     )
 
 
-def _print(published: Network, read: Read) -> None:
+def _print(published: Network, wanted: Wanted) -> None:
     width, height = published.size
     size = published.path.stat().st_size / 1e6
-    log = shlex.quote(next((name for name in read.logs if name.endswith(".mcap")), "LOG"))
-    sys.stdout.write(f"Network: {published.path} ({size:.1f} MB, {len(read.classes)} classes, {width}x{height})\n"
-                     f"Replay:  stsem-replay {log} --model {shlex.quote(str(published.path))}\n")  # fmt: skip
+    log = next((name for name in (*wanted.validation, *wanted.data) if name.endswith(".mcap")), "LOG")
+    command = shlex.join(["stsem", "replay", without_secrets(log), "--model", str(published.path)])
+    print(f"Network: {published.path} ({size:.1f} MB, {len(published.classes)} classes, {width}x{height})")
+    print(f"Replay:  {command}")

@@ -74,7 +74,7 @@ class Job:
         }  # fmt: skip
 
 
-_TWO_STREAMS = re.compile(r"(pspnet-r\d+)(?:-(?:sum|max|feature-sum|feature-concat))?((?:-w\d+){0,2})")
+_TWO_STREAMS = re.compile(r"(pspnet-r\d+)(?:-(?:sum|max|feature-sum|feature-concat))?(-7x7)?((?:-w\d+){0,2})")
 
 
 def stages_of(architecture: str) -> tuple[tuple[Stage, str], ...]:
@@ -87,8 +87,9 @@ def stages_of(architecture: str) -> tuple[tuple[Stage, str], ...]:
     match = _TWO_STREAMS.fullmatch(architecture)
     if match is None:
         return (("difference" if "-temporal" in architecture else "colour", architecture),)
-    base, widths = match[1], match[2].split("-w")[1:]
+    base, stem, widths = match[1], match[2] or "", match[3].split("-w")[1:]
     colour, difference = (f"-w{width}" if width else "" for width in (*widths, *widths, "", "")[:2])
     return (
-        ("colour", f"{base}-spatial{colour}"), ("difference", f"{base}-temporal{difference}"), ("fused", architecture),
+        ("colour", f"{base}-spatial{stem}{colour}"), ("difference", f"{base}-temporal{stem}{difference}"),
+        ("fused", architecture),
     )  # fmt: skip

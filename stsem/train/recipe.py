@@ -31,7 +31,8 @@ class Recipe:
         still: share of views whose previous frame is the current one.
         optimiser: "sgd" with `momentum`, or "adamw".
         rate, fused_rate: largest learning rate; it falls as (1 - i / iterations) ** power (Zhao et al., section 5.1).
-        power, warm_up: of the fall, and the iterations over which the rate rises from zero before.
+        power: of the fall.
+        warm_up: iterations over which the rate rises from zero first, at most a tenth of all.
         momentum, decay: of SGD, and weight decay.
         new_layers: factor on the rate of layers that do not come from given weights, where there are any.
         clip: largest norm of the gradient of all weights together; 0 for any.
@@ -89,7 +90,8 @@ class Recipe:
     def rate_at(self, iteration: int) -> float:
         """Learning rate of an iteration, counted from 0."""
         fall: float = max(0.0, 1 - iteration / self.iterations) ** self.power
-        return self.rate * min(1.0, (iteration + 1) / max(1, self.warm_up)) * fall
+        warm_up = min(self.warm_up, self.iterations // 10)
+        return self.rate * min(1.0, (iteration + 1) / max(1, warm_up)) * fall
 
 
 _LEAST = {

@@ -21,6 +21,8 @@ def training_curves(rows: Sequence[Point]) -> bytes:
         _line(loss, iterations, [row.loss for row in rows], LOSS)
         title(loss, "Loss", f"Mean since the point before; at the end {rows[-1].loss:.3f}.")
         loss.set_ylim(bottom=0)
+        loss.set_xlim(0, 1.02 * iterations[-1])
+        loss.xaxis.get_major_locator().set_params(integer=True)
         _line(rate, iterations, [row.rate for row in rows], MUTED)
         title(rate, "Learning rate")
         rate.set_ylim(bottom=0)
