@@ -3,7 +3,7 @@
 python -m bench.paper table1                                        # 3 seeds; the same command goes on after a stop
 python -m bench.paper table1 table2 table3 --jobs 2                 # cells that tables share are trained once
 python -m bench.paper table1 --data camvid=../shared/logs/camvid-0016E5-15hz.mcap
-python -m bench.paper table1 --cell sum/0                           # one cell again, by itself
+python -m bench.paper --cell sum/0                                  # one cell by itself, and what it starts from
 python -m bench.paper table1 table2 table3 --publish                # results and tables into the tree
 """
 
@@ -25,7 +25,10 @@ say = partial(print, flush=True)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run what is asked for; 0, or 1 with one sentence."""
-    given = _parser().parse_args(arguments)
+    parser = _parser()
+    given = parser.parse_args(arguments)
+    if not (given.tables or given.cell):
+        parser.error(f"name a table ({', '.join(TABLES)}) or a --cell")
     try:
         data = find_data(given.data, given.out, OFFICES)
         cells = _cells(given, data)
@@ -69,7 +72,7 @@ def _all(given: argparse.Namespace, cells: list[Cell], data: Data) -> None:
     if given.publish:
         publish(given.out, data.name)
     for path in write_tables(given.out, data.name, given.tables):
-        say(f"{path}\n\n{path.read_text(encoding='utf-8')}")
+        say(f"\n{path}\n\n{path.read_text(encoding='utf-8')}")
 
 
 def child_command(cell: Cell, data: str, out: Path) -> list[str]:

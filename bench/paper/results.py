@@ -1,7 +1,7 @@
 """Results of the cells of one data set, and the numbers that tables are made of."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,9 +47,10 @@ class Results:
         values = self.values(network, dose, measure)
         return spread(list(values.values())) if values else None
 
-    def class_means(self, network: str, dose: str = "right") -> list[float]:
-        """IoU of each class in per cent, mean over seeds; NaN for a class without truth; empty without results."""
-        found = self.of.get((network, dose), {}).values()
+    def class_means(self, network: str, dose: str = "right", seeds: Collection[int] | None = None) -> list[float]:
+        """IoU of each class in per cent, mean over seeds (None: all); NaN for a class without truth; empty without
+        results."""
+        found = [result for seed, result in self.of.get((network, dose), {}).items() if seeds is None or seed in seeds]
         if not found:
             return []
         iou = np.array([scores(np.array(result["matrix"], np.int64)).iou for result in found])
