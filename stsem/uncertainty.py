@@ -10,6 +10,9 @@ import numpy.typing as npt
 MEASURES = ("variance", "entropy", "mutual_information")
 """What a network may say besides its confidence, as it names its outputs; see `docs/metrics.md`, section 1."""
 
+DOUBT = "one_minus_confidence"
+"""The measure that every network has: 1 - confidence."""
+
 UNITS = {"variance": "", "entropy": "nats", "mutual_information": "nats"}
 
 CONFIDENCE_STEPS = 64

@@ -17,7 +17,7 @@ from stsem.pose import Trajectory, to_quaternion
 from stsem.replay.engine import Replayed
 from stsem.replay.runs import Context
 from stsem.report.annotated import AnnotatedLog
-from stsem.report.inputs import ReportInputs, StripFrame
+from stsem.report.inputs import ReportInputs, StripFrame, UnsureFrame
 from stsem.sim.trace import Marks, RunTrace, write_trace
 
 MAX_POSE_GAP_NS = 150_000_000
@@ -34,6 +34,7 @@ def report_inputs(context: Context, document: Document, scratch: Path, *, plots:
         frames={run.mode.name: RunRows(run, replayed) for run in replayed.runs},
         strip=_strip(replayed),
         strip_pass="offline" if any(run.offline is not None for run in replayed.runs) else "delivered",
+        unsure=_unsure(replayed),
         trace=(lambda path: write_trace(path, _traces(context))) if clocked else None,
         trajectory=None if context.log.trajectory is None else _trajectory(context.log.trajectory, context.log),
         point_cloud=_map(context, scratch),
@@ -63,6 +64,16 @@ def _strip(replayed: Replayed) -> tuple[StripFrame, ...]:
                 distance[run.mode.name] = picture.index - source
         strip.append(StripFrame(picture.index, picture.image, picture.truth, answers, distance))
     return tuple(strip)
+
+
+def _unsure(replayed: Replayed) -> UnsureFrame | None:
+    """Of the first mode that has one: the network is the same in all."""
+    for run in replayed.runs:
+        if run.record.unsurest is not None and (kept := run.record.unsurest.frame) is not None:
+            return UnsureFrame(
+                run.mode.name, kept.index, kept.image, kept.truth, kept.labels, kept.confidence, kept.uncertainty
+            )
+    return None
 
 
 def _traces(context: Context) -> Iterator[RunTrace]:

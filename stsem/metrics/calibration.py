@@ -10,10 +10,7 @@ from stsem.classes import Labels
 from stsem.metrics.reliability import WRONG, Counts, Reliability, area_under_roc, error_counts, reliability, rightness
 from stsem.metrics.scorecard import STRATA
 from stsem.result import Outcome
-from stsem.uncertainty import CONFIDENCE_STEPS, Confidence, Uncertainty
-
-DOUBT = "one_minus_confidence"
-"""The measure of uncertainty that every network has: 1 - confidence."""
+from stsem.uncertainty import CONFIDENCE_STEPS, DOUBT, Confidence, Uncertainty
 
 
 @dataclass(frozen=True)

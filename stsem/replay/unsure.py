@@ -8,8 +8,8 @@ from stsem.log.log import Loaded
 from stsem.result import FrameResult
 from stsem.uncertainty import Confidence, Uncertainty
 
-PREFERRED = "entropy"
-"""The measure that frames are ordered by; a network without it is asked for its first one."""
+PREFERRED = "mutual_information"
+"""The measure that frames are ordered by: what the weights do not know. A network without it gives its first one."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,10 @@ from stsem.frame import Frame, Image
 from stsem.log import encode
 from stsem.log.classtable import METADATA
 from stsem.result import FrameResult
+from stsem.uncertainty import ROOT, TOP_LEVEL, UNITS, Uncertainty, ceiling
+
+LEVELS = "stsem.uncertainty"
+"""Metadata record: measure -> the value that a level of its images stands for."""
 
 _OPAQUE = 0.55
 _WORLD, _CAMERA = "world", "camera_optical"
@@ -38,7 +42,9 @@ class AnnotatedLog:
     """Writes channels per mode while a replay goes on: `with AnnotatedLog(...)`, which leaves no file after an error.
 
     Channels: `/stsem/MODE/overlay` (CompressedImage), `/stsem/MODE/labels` (RawImage rgb8 in the classes' colours),
-    `/stsem/MODE/answer` (JSON: outcome, keyframe, latency), `/stsem/pose` (FrameTransform), `/stsem/map` (PointCloud).
+    `/stsem/MODE/answer` (JSON: outcome, keyframe, latency), `/stsem/pose` (FrameTransform), `/stsem/map` (PointCloud),
+    and for segmented frames of a network that gives them `/stsem/MODE/uncertainty/MEASURE` (RawImage mono8; the
+    metadata record `stsem.uncertainty` says which value a level stands for).
     Message times are capture stamps of the log, so that it lines up with the log it was made from. The metadata record
     `stsem.classes` says name -> `#rrggbb id`: with it, the labels read back as a log's truth would.
 
@@ -54,6 +60,7 @@ class AnnotatedLog:
         self._path, self._palette = path, classes.palette()
         self._channels: dict[str, int] = {}
         self._posed: set[int] = set()
+        self._explained = False
         with _writing(path):
             self._stream = path.open("wb")
             self._writer = Writer(self._stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
@@ -82,9 +89,20 @@ class AnnotatedLog:
         )
         self._message(f"/stsem/{mode}/labels", stamp, encode.raw_image(colours, "rgb8", stamp, _CAMERA))
         self._json(f"/stsem/{mode}/answer", stamp, _facts(result))
+        if result.uncertainty is not None:
+            self._uncertainty(mode, stamp, result.uncertainty)
         if frame.T_WC is not None and frame.index not in self._posed:
             self._posed.add(frame.index)
             self._message("/stsem/pose", stamp, _transform(frame.T_WC, stamp))
+
+    def _uncertainty(self, mode: str, stamp_ns: int, said: Uncertainty) -> None:
+        if not self._explained:
+            self._explained = True
+            with _writing(self._path):
+                self._writer.add_metadata(LEVELS, {measure: _scale(measure, said.classes) for measure in said.measures})
+        for measure in said.measures:
+            image = encode.raw_image(said.of(measure), "mono8", stamp_ns, _CAMERA)
+            self._message(f"/stsem/{mode}/uncertainty/{measure}", stamp_ns, image)
 
     def map(self, stamp_ns: int, xyz: npt.NDArray[np.float64], labels: Labels) -> None:
         """The labelled points (n, 3) in world metres, coloured by class, shown from `stamp_ns` on."""
@@ -154,6 +172,12 @@ def _legend(classes: ClassSet) -> dict[str, str]:
     """name -> "#rrggbb id", as stsem reads class tables of colour-coded labels."""
     colours = classes.palette()
     return {name: f"#{colours[i].tobytes().hex()} {i}" for i, name in enumerate(classes.names)}
+
+
+def _scale(measure: str, classes: int) -> str:
+    """`value = 2.5649 nats (level / 255)^4`."""
+    top = f"{ceiling(measure, classes):.5g} {UNITS[measure]}".rstrip()
+    return f"value = {top} (level / {TOP_LEVEL})^{ROOT}"
 
 
 def _facts(result: FrameResult) -> dict[str, Any]:

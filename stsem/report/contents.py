@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 from stsem.document.schema import Document
 from stsem.report.outline import Figure, Outline, Section, Text
-from stsem.report.sections import accuracy, headline, origin, timing
+from stsem.report.sections import accuracy, calibration, headline, origin, timing
 
 _Maker = Callable[[Document], Section | None]
 _RESULTS: tuple[_Maker, ...] = (
     accuracy.comparison_section, accuracy.loss_section, accuracy.distance_section, timing.latency_section,
-    timing.outcomes_section, accuracy.classes_section,
+    timing.outcomes_section, accuracy.classes_section, calibration.calibration_section,
 )  # fmt: skip
 _BASIS: tuple[_Maker, ...] = (
     origin.space_section, origin.unmeasured_section, origin.input_section, origin.identity_section,
@@ -25,7 +25,11 @@ def outline(document: Document, pictures: frozenset[str], strip_pass: str = "off
         pictures: names of the pictures that were drawn; the others are left out.
         strip_pass: which pass the answers in the strip come from.
     """
-    makers = (*_RESULTS, *([lambda _: _strip(document, strip_pass)] if "strip" in pictures else []), *_BASIS)
+    looks: dict[str, _Maker] = {
+        "uncertainty": lambda _: calibration.uncertainty_section(document.accuracy_state == "measured"),
+        "strip": lambda _: _strip(document, strip_pass),
+    }
+    makers = (*_RESULTS, *(make for name, make in looks.items() if name in pictures), *_BASIS)
     sections = [section for make in makers if (section := make(document)) is not None]
     return Outline(
         title=headline.report_title(document),

@@ -8,6 +8,7 @@ from stsem.classes import ClassSet, Labels
 from stsem.document.schema import Document
 from stsem.frame import Image
 from stsem.result import FrameResult
+from stsem.uncertainty import Confidence, Uncertainty
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,29 @@ class StripFrame:
 
 
 @dataclass(frozen=True, eq=False)
+class UnsureFrame:
+    """The frame that the network is least sure of.
+
+    Args:
+        mode: whose answer it is.
+        index: log index.
+        image: (H, W, 3) uint8 RGB.
+        truth: (h, w) uint8 in the log's classes, 255 ignored; None without truth.
+        labels: (H, W) uint8, from the network.
+        confidence: (H, W) float32; None where none is stated.
+        uncertainty: maps (H, W).
+    """
+
+    mode: str
+    index: int
+    image: Image
+    truth: Labels | None
+    labels: Labels
+    confidence: Confidence | None
+    uncertainty: Uncertainty
+
+
+@dataclass(frozen=True, eq=False)
 class ReportInputs:
     """Everything that a report folder is made from.
 
@@ -75,6 +99,7 @@ class ReportInputs:
         frames: mode -> the rows of its run, by log index; they may be made when they are looked at.
         strip: up to about five frames worth looking at.
         strip_pass: which pass the strip's answers come from: `offline`, `delivered` or `streaming`.
+        unsure: the frame that the network is least sure of; None where it gives no maps of uncertainty.
         trace: writes trace.json to a path; None without a clock.
         answer_classes: classes of the answers where the log has no class table; None where it has.
         trajectory: pieces of trajectory.txt; None without poses.
@@ -87,6 +112,7 @@ class ReportInputs:
     frames: Mapping[str, Sequence[FrameRow]] = field(default_factory=dict)
     strip: tuple[StripFrame, ...] = ()
     strip_pass: str = "offline"
+    unsure: UnsureFrame | None = None
     trace: Callable[[Path], None] | None = None
     trajectory: Iterable[bytes] | None = None
     answer_classes: ClassSet | None = None

@@ -4,10 +4,15 @@ import re
 
 from stsem.document.part import Part, definition
 from stsem.document.timing import PERCENTILES, Distribution
+from stsem.uncertainty import DOUBT
 
 NOT_MEASURED = "not measured"
 TOO_FEW = "n too small"
 NONE = "–"
+MEASURES = {
+    DOUBT: "1 − confidence", "variance": "variance", "entropy": "entropy", "mutual_information": "mutual information",
+}  # fmt: skip
+"""Measures of uncertainty in `report.json` -> their names for readers, in the order of tables."""
 
 
 def percent(share: float | None, digits: int = 1) -> str:

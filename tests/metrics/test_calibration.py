@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from stsem.classes import NO_LABEL
-from stsem.metrics.calibration import DOUBT, Calibration, CalibrationMeter
+from stsem.metrics.calibration import Calibration, CalibrationMeter
 from stsem.metrics.reliability import BINS, IGNORED, area_under_roc, error_counts, reliability, rightness
 from stsem.result import Outcome
-from stsem.uncertainty import CONFIDENCE_STEPS, Uncertainty
+from stsem.uncertainty import CONFIDENCE_STEPS, DOUBT, Uncertainty
 
 SEGMENTED, PROPAGATED = Outcome.SEGMENTED, Outcome.PROPAGATED
 Bytes = npt.NDArray[np.uint8]

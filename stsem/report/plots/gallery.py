@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from stsem.report.inputs import ReportInputs
-from stsem.report.plots import classes, distance, latency, loss, overview, strip, timeline
+from stsem.report.plots import calibration, classes, distance, latency, loss, overview, strip, timeline, uncertainty
 from stsem.report.plots.style import look, png, svg
 
 
@@ -32,9 +32,11 @@ DRAWERS: dict[str, Callable[[ReportInputs], Figure | None]] = {
     "classes": classes.draw,
     "latency": latency.draw,
     "timeline": timeline.draw,
+    "calibration": calibration.draw,
+    "uncertainty": uncertainty.draw,
     "strip": strip.draw,
 }
-_PHOTOGRAPHS = ("strip",)
+_PHOTOGRAPHS = ("strip", "uncertainty")
 
 
 def draw_all(inputs: ReportInputs) -> dict[str, Picture]:

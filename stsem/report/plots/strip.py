@@ -71,7 +71,7 @@ def errors(truth: Labels, answers: Mapping[str, Labels], modes: list[str]) -> Im
         answers: mode -> labels; a mode without an answer is wrong everywhere.
         modes: the modes compared, in the order of the report.
     """
-    wrong = np.stack([_wrong(truth, answers.get(mode)) for mode in modes])
+    wrong = np.stack([wrong_pixels(truth, answers.get(mode)) for mode in modes])
     picture = np.empty((*truth.shape, 3), np.uint8)
     picture[:] = RIGHT
     for i, mode in enumerate(modes):
@@ -82,7 +82,8 @@ def errors(truth: Labels, answers: Mapping[str, Labels], modes: list[str]) -> Im
     return picture
 
 
-def _wrong(truth: Labels, answer: Labels | None) -> npt.NDArray[np.bool_]:
+def wrong_pixels(truth: Labels, answer: Labels | None) -> npt.NDArray[np.bool_]:
+    """(h, w) where a judged pixel of `truth` (h, w) has another label, or none; `answer` may have another size."""
     if answer is None:
         return np.asarray(truth != NO_LABEL)
     rows = np.arange(truth.shape[0]) * answer.shape[0] // truth.shape[0]
