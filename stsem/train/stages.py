@@ -137,9 +137,8 @@ def _matching(path: Path, identity: dict[str, Any]) -> dict[str, Any]:
 
 
 def _judged(training: Training, job: Job, validation: Pairs, most: int | None) -> tuple[float, float]:
-    machine = job.machine
-    with _threads(machine.threads * machine.workers):
-        scores = judge(training.averaged, job.sidecar, validation, device=machine.device, most=most).compute()
+    device, workers = job.machine.device, job.machine.workers
+    scores = judge(training.averaged, job.sidecar, validation, device=device, workers=workers, most=most).compute()
     return scores.miou, scores.pixel_accuracy
 
 
