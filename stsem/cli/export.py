@@ -63,7 +63,7 @@ def export(
         raise UsageError("--weights needs --architecture, the network that they are for.")
     if out.suffix != ".onnx":
         raise UsageError(f"The network is written as {out}, but its name must end in .onnx.")
-    described = _described(sidecar)
+    described = sidecar_of(sidecar)
     classes = len(described.classes)
     if checkpoint is not None:
         network = load_checkpoint(checkpoint, classes)
@@ -91,7 +91,8 @@ def _built(architecture: str, weights: Path | None, sidecar: "Sidecar") -> "Segm
     return network
 
 
-def _described(path: Path) -> "Sidecar":
+def sidecar_of(path: Path) -> "Sidecar":
+    """The sidecar in a file. Raises NetworkError."""
     from stsem.errors import NetworkError
     from stsem.inference.sidecar import parse
 

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from stsem import __version__
-from stsem.cli import cache, convert, costs, export, gate, inspect, quantize, replay, synth, train
+from stsem.cli import adopt, cache, convert, costs, export, gate, inspect, quantize, replay, synth, train
 from stsem.cli.launch import launch
 from stsem.errors import EXIT_USAGE
 
@@ -22,6 +22,7 @@ app.command("inspect", help=inspect.HELP)(inspect.inspect)
 app.command("gate", help=gate.HELP)(gate.gate)
 app.command("convert", help=convert.HELP)(convert.convert)
 app.command("export", help=export.HELP)(export.export)
+app.command("adopt", help=adopt.HELP)(adopt.adopt)
 app.command("quantize", help=quantize.HELP)(quantize.quantize)
 app.command("synth", help=synth.HELP)(synth.synth)
 app.command("train", help=train.HELP)(train.train)
