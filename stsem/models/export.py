@@ -15,6 +15,7 @@ from torch import nn
 from torch.nn import functional
 
 from stsem.errors import NetworkError, OutputError
+from stsem.models.folding import folded
 from stsem.models.montecarlo import MAPS, fix_masks, uncertainty
 from stsem.models.network import CHANNELS, SegmentationNetwork
 
@@ -81,7 +82,7 @@ def export_onnx(
     with warnings.catch_warnings(), torch.no_grad():
         warnings.simplefilter("ignore")  # torch's exporter deprecates its own internals
         program = torch.onnx.export(
-            answer_of(network, size, passes), example, dynamo=True, external_data=False, opset_version=OPSET,
+            folded(answer_of(network, size, passes)), example, dynamo=True, external_data=False, opset_version=OPSET,
             verbose=False, input_names=names, output_names=["labels", "confidence", *(MAPS if passes else ())],
         )  # fmt: skip
     if program is None:

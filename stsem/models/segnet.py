@@ -77,8 +77,21 @@ def decoded(decoders: Iterable[nn.Module], x: Tensor, places: Sequence[Tensor], 
     """
     finer = (image, *places[:-1])  # a pool's input has the size of the pool's before it
     for decoder, where, like in zip(decoders, reversed(places), reversed(finer), strict=True):
-        x = decoder(functional.max_unpool2d(x, where, (2, 2), (2, 2), output_size=like.shape[-2:]))
+        x = decoder(unpooled(x, where, *like.shape[-2:]))
     return x
+
+
+def unpooled(x: Tensor, places: Tensor, height: int, width: int) -> Tensor:
+    """Values at their places in a map of `height` x `width`, zero elsewhere; torch's `max_unpool2d`.
+
+    Written as a scatter, which is an operator of ONNX; the exporter writes torch's own with an index for every axis.
+
+    Args:
+        x: (B, c, h, w).
+        places: (B, c, h, w) int64, positions y * width + x, none twice in a channel.
+    """
+    flat = x.new_zeros(*x.shape[:2], height * width).scatter(2, places.flatten(2), x.flatten(2))
+    return flat.unflatten(2, (height, width))
 
 
 class SegNetBasic(SegmentationNetwork):

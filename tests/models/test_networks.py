@@ -13,6 +13,7 @@ onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 from stsem.errors import NetworkError
 from stsem.models.cost import cost, cost_of
 from stsem.models.export import Answer, export_onnx
+from stsem.models.folding import folded
 from stsem.models.montecarlo import fix_masks, uncertainty
 from stsem.models.network import SegmentationNetwork, softmax
 from stsem.models.pspnet import PyramidPooling
@@ -236,6 +237,29 @@ def _answered(path: Path, threads: int) -> bytes:
     assert labels.shape == confidence.shape == (1, SIZE[1], SIZE[0])
     assert labels.dtype == np.uint8
     return labels.tobytes() + confidence.tobytes()
+
+
+def test_folding_changes_no_answer() -> None:
+    """Normalisations that know something go into the convolutions before them, transposed ones too; what is left
+    shares its weights, and the network itself stays as it was."""
+    torch.manual_seed(0)
+    network, image = build("adapnet-pp-w1", 4), torch.randn(2, 3, 41, 67)
+    with torch.no_grad():
+        for layer in (layer for layer in network.modules() if isinstance(layer, torch.nn.BatchNorm2d)):
+            torch.nn.init.uniform_(layer.weight, 0.5, 2)
+            torch.nn.init.uniform_(layer.bias, -1, 1)
+        for _ in range(3):
+            network.train()(image)
+        expected = network.eval()(image)
+        lighter = folded(network)
+        assert torch.allclose(lighter(image), expected, atol=1e-5)
+        assert torch.equal(network(image), expected)
+    kinds = [[sum(isinstance(layer, kind) for layer in net.modules()) for net in (network, lighter)]
+             for kind in (torch.nn.BatchNorm2d, torch.nn.ConvTranspose2d)]  # fmt: skip
+    assert kinds[0][1] < kinds[0][0] / 2  # the rest stands before its convolution
+    assert kinds[1] == [3, 3]
+    assert lighter.decoder.score.weight is network.decoder.score.weight
+    assert not any(isinstance(layer, torch.nn.BatchNorm2d) for layer in folded(OneStream(TINY, 4).eval()).modules())
 
 
 def test_a_size_that_does_not_fit_names_the_nearest() -> None:
