@@ -91,7 +91,7 @@ def unpooled(x: Tensor, places: Tensor, height: int, width: int) -> Tensor:
         places: (B, c, h, w) int64, positions y * width + x, none twice in a channel.
     """
     flat = x.new_zeros(*x.shape[:2], height * width).scatter(2, places.flatten(2), x.flatten(2))
-    return flat.unflatten(2, (height, width))
+    return flat.reshape(*x.shape[:2], height, width)
 
 
 class SegNetBasic(SegmentationNetwork):
