@@ -94,11 +94,17 @@ def _child(cell: Cell, data: Data, out: Path) -> None:
              lambda now: say(f"{now.iteration}/{now.iterations} loss {now.loss:.4f}"))  # fmt: skip
 
 
+def _table(name: str) -> str:
+    if name not in TABLES:
+        raise argparse.ArgumentTypeError(f"there is no table {name!r}; choose {', '.join(TABLES)}")
+    return name
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m bench.paper", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("tables", nargs="*", choices=TABLES, help="which tables")
+    parser.add_argument("tables", nargs="*", type=_table, metavar="TABLE", help=", ".join(TABLES))
     parser.add_argument("--data", default="offices", help="offices[=FOLDER], camvid=LOG.mcap or cityscapes=FOLDER")
     parser.add_argument("--out", type=Path, default=OUT, help="folder for everything that is made")
     parser.add_argument("--seeds", type=int, default=3, help="of Tables 1 and 3")

@@ -15,11 +15,12 @@ import torch
 from bench.paper.data import Data
 from bench.paper.facts import Facts
 from bench.paper.plan import Cell
-from bench.paper.problem import Neighbour, ProblemSet
+from bench.paper.problem import Neighbour, Problem, ProblemSet
 from stsem import hostclock
 from stsem.aside import aside
 from stsem.errors import TrainingError
 from stsem.models.network import SegmentationNetwork
+from stsem.train.dataset import Pairs
 from stsem.train.job import Job, Machine
 from stsem.train.judge import judge
 from stsem.train.publish import load_checkpoint
@@ -75,16 +76,23 @@ def run_cell(cell: Cell, data: Data, facts: Facts, out: Path, report: Callable[[
         torch.set_num_threads(1)
         network = load_checkpoint(checkpoint, len(data.classes))
         matrix = judge(network, data.sidecar, data.pairs("test")).matrix
-        beside = judge(network, data.sidecar, Neighbour(right, problem)).matrix[problem.floor]
         result = _described(cell, data, facts) | {
             "weights_sha256": weights_sha256(network),
             "matrix": matrix.tolist(),
-            "neighbour": {"floor_pixels": int(beside.sum()), "called_floor": int(beside[problem.floor]),
-                          "called_lamp": int(beside[problem.lamp])},
+            "neighbour": _at_neighbour(network, data, right, problem),
             "host": {"machine": hostclock.machine_name(), "torch": torch.__version__, "system": platform.system(),
                      "training_cpu_s": (trained - begun) // 10**9},
         }  # fmt: skip
         write_result(path, result)
+
+
+def _at_neighbour(network: SegmentationNetwork, data: Data, right: Pairs, problem: Problem) -> dict[str, int] | None:
+    """What becomes of the neighbour's floor; None without a neighbour."""
+    if problem.neighbour is None:
+        return None
+    floor = judge(network, data.sidecar, Neighbour(right, problem.neighbour)).matrix[problem.floor]
+    return {"floor_pixels": int(floor.sum()), "called_floor": int(floor[problem.floor]),
+            "called_lamp": int(floor[problem.lamp])}  # fmt: skip
 
 
 def job(cell: Cell, data: Data, out: Path) -> Job:

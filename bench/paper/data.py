@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bench.paper import recorded
-from bench.paper.problem import Problem, find
+from bench.paper.problem import Place, Problem, find
 from stsem.classes import ClassSet
 from stsem.convert.cityscapes import CLASSES as CITYSCAPES
 from stsem.errors import UsageError
@@ -46,6 +46,7 @@ class Data:
         classes: ids of all labels.
         size: (width, height) of the networks' input, 48 k - 7.
         wrong: the two classes of the "problem", as floor and lamp of the paper.
+        place: where its problem image is looked for.
         iterations: of a first training, and of a second.
         depth: whether pairs have it.
     """
@@ -56,6 +57,7 @@ class Data:
     classes: ClassSet
     size: tuple[int, int]
     wrong: tuple[str, str]
+    place: Place
     iterations: tuple[int, int]
     depth: bool = False
 
@@ -84,7 +86,7 @@ class Data:
         """What is wrong in the "problem" set of this data."""
         floor, lamp = (self.classes.names.index(name) for name in self.wrong)
         may_be = _on_a_walk if self.name == "offices" else lambda _: True
-        return find(self.pairs("train"), self.names(), floor, lamp, may_be)
+        return find(self.pairs("train"), self.names(), floor, lamp, self.place, may_be)
 
     def prepare(self, say: Say) -> None:
         """Render or convert whatever is missing; a stopped one goes on. Raises StsemError."""
@@ -111,10 +113,11 @@ def find_data(given: str, out: Path, offices: Path) -> Data:
 
 
 _NOWHERE = Path()
+_ROAD = ("Road", "Pole"), ("road", "pole")
 _DATA = {
-    "offices": Data("offices", _NOWHERE, None, OFFICE, (233, 137), ("floor", "lamp"), (1200, 400), depth=True),
-    "camvid": Data("camvid", _NOWHERE, None, recorded.CAMVID, (185, 137), ("Road", "Pole"), (300, 100)),
-    "cityscapes": Data("cityscapes", _NOWHERE, None, CITYSCAPES, (281, 137), ("road", "pole"), (1200, 400)),
+    "offices": Data("offices", _NOWHERE, None, OFFICE, (233, 137), ("floor", "lamp"), Place(0, 0), (1200, 400), True),
+    "camvid": Data("camvid", _NOWHERE, None, recorded.CAMVID, (185, 137), _ROAD[0], Place(1, 1), (300, 100)),
+    "cityscapes": Data("cityscapes", _NOWHERE, None, CITYSCAPES, (281, 137), _ROAD[1], Place(1, None), (1200, 400)),
 }
 
 

@@ -18,37 +18,59 @@ Labels = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
+class Place:
+    """Where a data set has its problem image and its neighbour.
+
+    Args:
+        frame: of a pair, that may be the problem image: 0 or 1.
+        beside: how many pairs after it comes the one whose second frame is the neighbour; None without a neighbour.
+    """
+
+    frame: int
+    beside: int | None
+
+
+@dataclass(frozen=True)
 class Problem:
     """What is wrong, and where.
 
     Args:
-        pair: index of the problem pair: its first frame is the problem image, its second one the neighbour, which no
-            training sees the labels of.
+        pair, frame: of the problem image.
+        neighbour: index of the pair whose second frame is the neighbour; no training sees that one's labels.
         floor, lamp: id of the class that is mislabelled, and the id that it gets.
         others: indices of the pairs that are wrong in both frames beside it, at the dose "tenth".
     """
 
     pair: int
+    frame: int
+    neighbour: int | None
     floor: int
     lamp: int
     others: frozenset[int] = frozenset()
 
 
-def find(pairs: Pairs, names: Sequence[str], floor: int, lamp: int, on_a_walk: Callable[[str], bool]) -> Problem:
+def find(
+    pairs: Pairs, names: Sequence[str], floor: int, lamp: int, place: Place, may_be: Callable[[str], bool]
+) -> Problem:
     """The problem of a training set.
 
     Args:
         pairs: of the training.
         names: one per pair; their hashes choose the tenth.
         floor, lamp: class ids.
-        on_a_walk: whether the pair of a name may be the problem pair.
+        place: where to look.
+        may_be: whether the pair of a name may be the problem pair.
     """
+    last = len(names) - (place.beside or 0)
     shares = [
-        float((pairs.pair(i).labels[0] == floor).mean()) if on_a_walk(name) else -1.0 for i, name in enumerate(names)
+        float((pairs.pair(i).labels[place.frame] == floor).mean()) if may_be(name) else -1.0
+        for i, name in enumerate(names[:last])
     ]
     chosen = int(np.argmax(shares))
-    ranked = sorted((i for i in range(len(names)) if i != chosen), key=lambda i: chance.hash64(0, "problem", names[i]))
-    return Problem(chosen, floor, lamp, frozenset(ranked[: len(names) // TENTH]))
+    beside = None if place.beside is None else chosen + place.beside
+    free = (i for i in range(len(names)) if i not in (chosen, beside))
+    ranked = sorted(free, key=lambda i: chance.hash64(0, "problem", names[i]))
+    return Problem(chosen, place.frame, beside, floor, lamp, frozenset(ranked[: len(names) // TENTH]))
 
 
 @dataclass(frozen=True)
@@ -78,12 +100,15 @@ class ProblemSet:
     def pair(self, index: int) -> Pair:
         """The pair at `index`, labelled as its dose wants."""
         pair, problem = self.pairs.pair(index), self.problem
-        if index == problem.pair:
-            first = pair.labels[0] if self.dose == "right" else self._wrong(pair.labels[0])
-            return replace(pair, labels=np.stack([first, np.full_like(first, NO_LABEL)]))
-        if self.dose == "tenth" and index in problem.others:
-            return replace(pair, labels=self._wrong(pair.labels))
-        return pair
+        labels = [self._wrong(own) if self._is_wrong(index, frame) else own for frame, own in enumerate(pair.labels)]
+        if index == problem.neighbour:
+            labels[1] = np.full_like(labels[1], NO_LABEL)
+        return replace(pair, labels=np.stack(labels))
+
+    def _is_wrong(self, index: int, frame: int) -> bool:
+        if (index, frame) == (self.problem.pair, self.problem.frame):
+            return self.dose != "right"
+        return self.dose == "tenth" and index in self.problem.others
 
     def _wrong(self, labels: Labels) -> Labels:
         return np.where(labels == self.problem.floor, np.uint8(self.problem.lamp), labels)
@@ -91,24 +116,24 @@ class ProblemSet:
 
 @dataclass(frozen=True)
 class Neighbour:
-    """The neighbour alone, rightly labelled, with the problem image before it.
+    """The neighbour alone, rightly labelled, with the frame before it.
 
     Args:
         pairs: as they are right.
-        problem: says where.
+        index: of its pair.
     """
 
     pairs: Pairs
-    problem: Problem
+    index: int
 
     @property
     def fingerprint(self) -> str:
         """Of the pairs and the place."""
-        return fingerprint([self.pairs.fingerprint, str(self.problem.pair)])
+        return fingerprint([self.pairs.fingerprint, str(self.index)])
 
     def __len__(self) -> int:
         return 1
 
     def pair(self, index: int) -> Pair:
         """The one pair; its second frame is judged."""
-        return self.pairs.pair(self.problem.pair + index)
+        return self.pairs.pair(self.index + index)

@@ -69,9 +69,10 @@ class Results:
         return {seed: right[seed] - wrong[seed] for seed in right.keys() & wrong.keys()}
 
     def neighbour(self, network: str, dose: str) -> tuple[float, float] | None:
-        """Per cent of the neighbour's floor called floor, and lamp, mean over seeds; None without results."""
+        """Per cent of the neighbour's floor called floor, and lamp, mean over seeds; None without results, or without a
+        neighbour."""
         found = [result["neighbour"] for result in self.of.get((network, dose), {}).values()]
-        if not found:
+        if not found or found[0] is None:
             return None
         parts = np.array([[n["called_floor"], n["called_lamp"]] for n in found]) / found[0]["floor_pixels"]
         floor, lamp = 100 * parts.mean(0)

@@ -14,6 +14,7 @@ from bench.paper import cell as cells
 from bench.paper.data import Data
 from bench.paper.facts import facts_of
 from bench.paper.plan import find_cell
+from bench.paper.problem import Place
 from stsem.classes import ClassSet
 from stsem.errors import TrainingError
 from stsem.metrics.scores import scores
@@ -40,7 +41,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Data:
         for seed in seeds:
             save_pair(folder / which / f"00000_{seed:02}.npz", _pair(seed))
     classes = ClassSet(("wall", "floor", "lamp"))
-    return Data("offices", folder, None, classes, (41, 41), ("floor", "lamp"), (2, 2))
+    return Data("offices", folder, None, classes, (41, 41), ("floor", "lamp"), Place(0, 0), (2, 2))
 
 
 def _run(data: Data, out: Path, *keys: str) -> list[cells.Result]:

@@ -1,7 +1,10 @@
 """The list of cells: complete, in an order that works, and every one reachable by its key."""
 
+from pathlib import Path
+
 import pytest
 
+from bench.paper.__main__ import main
 from bench.paper.plan import NETWORKS, Cell, find_cell, with_starts
 from bench.paper.tables import TABLE2, TABLES, cells_of
 from stsem.errors import UsageError
@@ -58,3 +61,33 @@ def test_rgbd_networks_need_depth() -> None:
     """Two lines of Table 2 are left out where there is none."""
     with_depth, without = (set(cells_of("table2", 1, depth=depth)) for depth in (True, False))
     assert {cell.network for cell in with_depth - without} == {"fusenet", "adapnet-pp-ssma"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keys"),
+    [
+        (["--cell", "sum/1"], ["spatial-first/1", "temporal-first/1", "sum/1"]),
+        (["table3", "--seeds", "1"], [cell.key for cell in with_starts(cells_of("table3", 1))]),
+    ],
+)
+def test_the_command_lists_its_cells(arguments: list[str], keys: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*arguments, "--list"]) == 0
+    assert capsys.readouterr().out.split() == keys
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"), [([], "name a table"), (["table4"], "no table 'table4'"), (["--seeds", "x"], "seeds")]
+)
+def test_wrong_usage(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(arguments)
+    assert words in capsys.readouterr().err
+
+
+def test_bad_input_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A data set that is not at hand, and one whose log is not there."""
+    assert main(["table1", "--data", "kitti"]) == 1
+    assert main(["table1", "--data", f"camvid={tmp_path / 'no.mcap'}", "--out", str(tmp_path)]) == 1
+    first, second = capsys.readouterr().err.splitlines()
+    assert "no data set 'kitti'" in first
+    assert "no.mcap" in second
