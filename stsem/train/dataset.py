@@ -86,7 +86,7 @@ class PairFolder:
             with path.open("rb") as file, np.load(file) as arrays:
                 depths = in_metres(arrays["depths_mm"]) if "depths_mm" in arrays else None
                 return Pair(arrays["images"], arrays["labels"], depths)
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as err:
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as err:
             raise TrainingError(
                 f"The training pair {path} cannot be read ({err}); remove it and render it anew."
             ) from err

@@ -57,7 +57,7 @@ class LogPairs:
         try:
             with path.open("rb") as file, np.load(file) as arrays:
                 return dict(arrays)
-        except (OSError, ValueError, zipfile.BadZipFile) as err:
+        except (OSError, EOFError, ValueError, zipfile.BadZipFile) as err:
             raise TrainingError(f"The decoded frame {path} cannot be read ({err}); remove its folder, "
                                 "and the log is decoded anew.") from err  # fmt: skip
 

@@ -43,7 +43,7 @@ def whole(pairs: PairFolder, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_learns_and_what_it_publishes_works(pairs: PairFolder, tmp_path: Path) -> None:
     """From noise to most pixels right in 40 small steps, both streams at once, through ONNX and the user's loader."""
     reports: list[Progress] = []
-    recipe = replace(short(SCRATCH, 40), report_every=10)
+    recipe = replace(short(SCRATCH, 40), report_every=10, validate_every=100)
     job = Job("pspnet-r18-w2-w1", "fused", SIDECAR, recipe)
     checkpoint = train_stage(job, pairs, pairs, tmp_path / "stage", reports.append)
     assert [r.iteration for r in reports] == [10, 20, 30, 40]

@@ -1,0 +1,234 @@
+"""What a training reads: logs and folders give the same pairs; what cannot be read is one sentence."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from stsem.classes import NO_LABEL, ClassSet
+from stsem.errors import ClassTableError, StsemError, TrainingError
+from stsem.log.log import open_log
+from stsem.train.consecutive import consecutive
+from stsem.train.dataset import Pairs, save_pair
+from stsem.train.log_pairs import decode_log
+from stsem.train.sources import Reading, classes_of, join, open_source
+from stsem.train.vocabulary import lookup, network_classes, read_class_map
+
+from tests.made_up_walk import NAMES, write_walk  # isort: skip
+
+from .squares import pair
+
+SPARSE = lambda index: index % 4 == 1 or index == 0  # noqa: E731
+
+
+def _write_images(folder: Path, log: Path) -> Path:
+    """The frames of a log as a folder of images."""
+    for name in ("images", "labels", "depth"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    (folder / "classes.txt").write_text("\n".join(NAMES.values()))
+    with open_log([log]) as opened:
+        for loaded in opened.frames(range(len(opened.plans)), depth=True, previous=False, truth=True):
+            assert loaded.frame is not None
+            name = f"{loaded.index}.png"  # 9 comes before 10 by nature
+            cv2.imwrite(str(folder / "images" / name), loaded.frame.image[:, :, ::-1])
+            if loaded.truth is not None:
+                cv2.imwrite(str(folder / "labels" / name), loaded.truth)
+            if loaded.frame.depth is not None:
+                millimetres = np.nan_to_num(loaded.frame.depth * 1000).round().astype(np.uint16)
+                cv2.imwrite(str(folder / "depth" / name), millimetres)
+    return folder
+
+
+def _assert_same(one: Pairs, other: Pairs) -> None:
+    assert len(one) == len(other)
+    for index in range(len(one)):
+        a, b = one.pair(index), other.pair(index)
+        assert np.array_equal(a.images, b.images)
+        assert np.array_equal(a.labels, b.labels)
+        assert a.depths is not None
+        assert b.depths is not None
+        assert np.array_equal(a.depths, b.depths, equal_nan=True)
+
+
+@pytest.mark.parametrize("truth", [None, SPARSE], ids=["every frame", "few frames"])
+def test_logs_and_folders_give_the_same_pairs(tmp_path: Path, truth: Callable[[int], bool] | None) -> None:
+    """Images, labels and depth; frames without truth serve as predecessors."""
+    log = write_walk(tmp_path / "walk.mcap", **({} if truth is None else {"truth": truth}))
+    how = Reading(tmp_path / "cache", depth=True)
+    of_log, of_folder = (open_source([str(given)], how) for given in (log, _write_images(tmp_path / "images", log)))
+    assert of_log.classes.names == of_folder.classes.names == tuple(NAMES.values())
+    assert of_log.size == of_folder.size == (96, 64)
+    _assert_same(of_log.pairs, of_folder.pairs)
+    assert len(of_log.pairs) == (11 if truth is None else 3)
+    labelled = [of_log.pairs.pair(index).labelled for index in range(len(of_log.pairs))]
+    assert set(labelled) == ({(0, 1)} if truth is None else {(0, 1), (1,)})
+
+
+def test_a_log_is_decoded_once_and_gone_on_with(tmp_path: Path) -> None:
+    """Frames that are there are not read again; a killed decoding goes on; another log starts anew."""
+    log, folder, seen = write_walk(tmp_path / "walk.mcap"), tmp_path / "frames", []
+    with open_log([log]) as opened:
+        first = decode_log(opened, folder, report=lambda done, total: seen.append((done, total)))
+        assert seen == [(k, 12) for k in range(1, 13)]
+        expected = [first.pair(index) for index in range(len(first))]
+        again = decode_log(opened, folder, report=lambda done, total: pytest.fail("decoded again"))
+        assert again.fingerprint == first.fingerprint
+        (folder / "frames.json").unlink()
+        (folder / "0000005.npz").unlink()
+        (folder / ".0000006.npz.999999999").write_bytes(b"half")
+        seen.clear()
+        last = decode_log(opened, folder, report=lambda done, total: seen.append((done, total)))
+        assert seen == [(12, 12)]
+        for index, one in enumerate(expected):
+            assert np.array_equal(last.pair(index).images, one.images)
+            assert np.array_equal(last.pair(index).labels, one.labels)
+    with open_log([write_walk(tmp_path / "other.mcap", frames=5)]) as other:
+        assert len(decode_log(other, folder)) == 4
+    (folder / "0000001.npz").write_bytes(b"")
+    with open_log([tmp_path / "other.mcap"]) as other, pytest.raises(TrainingError, match="0000001"):
+        decode_log(other, folder).pair(0)
+
+
+def test_frames_that_cannot_be_decoded(tmp_path: Path) -> None:
+    """A broken predecessor is left out, a broken labelled frame counted."""
+    log = write_walk(tmp_path / "walk.mcap", truth=SPARSE, broken=frozenset({4, 9}))
+    source = open_source([str(log)], Reading(tmp_path / "cache"))
+    assert len(source.pairs) == 2
+    alone = source.pairs.pair(1)
+    assert np.array_equal(alone.images[0], alone.images[1])
+    assert "1 labelled frames of walk cannot be decoded" in source.notes[0]
+
+
+@pytest.mark.parametrize(("labelled", "pairs"), [
+    ("", []), ("0", []), ("1", [(0, 0)]), ("10", [(0, 1)]), ("11", [(0, 1)]), ("01", [(0, 1)]),
+    ("1001", [(0, 1), (2, 3)]), ("0110", [(0, 1), (1, 2)]), ("00", []),
+])  # fmt: skip
+def test_which_frames_make_pairs(labelled: str, pairs: list[tuple[int, int]]) -> None:
+    """By hand."""
+    assert consecutive([mark == "1" for mark in labelled]) == pairs
+
+
+def test_sequences_do_not_meet(tmp_path: Path) -> None:
+    """Folders below `images` are recordings of their own: no pair crosses from one to the next."""
+    rng = np.random.default_rng(0)
+    for sequence, shade in (("a", 10), ("b", 200)):
+        for kind in ("images", "labels"):
+            (tmp_path / kind / sequence).mkdir(parents=True)
+        for k in range(3):
+            image = np.full((8, 9, 3), shade, np.uint8)
+            cv2.imwrite(str(tmp_path / "images" / sequence / f"{k}.png"), image)
+            cv2.imwrite(str(tmp_path / "labels" / sequence / f"{k}.png"), rng.integers(0, 2, (8, 9)).astype(np.uint8))
+    (tmp_path / "classes.json").write_text('["floor", "wall"]')
+    pairs = open_source([str(tmp_path)], Reading(tmp_path / "cache")).pairs
+    assert len(pairs) == 4
+    assert all(np.ptp(pairs.pair(index).images) == 0 for index in range(4))
+
+
+def _image_folder(folder: Path) -> Path:
+    """Two small labelled images."""
+    for kind in ("images", "labels"):
+        (folder / kind).mkdir(parents=True)
+        for k in range(2):
+            cv2.imwrite(str(folder / kind / f"{k}.png"), np.ones((8, 9, 3) if kind == "images" else (8, 9), np.uint8))
+    (folder / "classes.json").write_text('["floor", "wall"]')
+    return folder
+
+
+def _spoil(folder: Path, what: str) -> None:
+    image = str(folder / "images" / "1.png")
+    label = str(folder / "labels" / "1.png")
+    spoilt: dict[str, Callable[[], object]] = {
+        "id": lambda: cv2.imwrite(label, np.full((8, 9), 7, np.uint8)),
+        "label size": lambda: cv2.imwrite(label, np.ones((4, 9), np.uint8)),
+        "image size": lambda: cv2.imwrite(image, np.ones((4, 9, 3), np.uint8)),
+        "image": lambda: Path(image).write_bytes(b"no image"),
+        "table": (folder / "classes.json").unlink,
+        "names": lambda: [path.rename(path.with_stem(f"x{path.stem}")) for path in (folder / "labels").iterdir()],
+        "labels": lambda: shutil.rmtree(folder / "labels"),
+        "two": lambda: cv2.imwrite(image.replace("png", "jpg"), np.ones((8, 9, 3), np.uint8)),
+    }
+    spoilt[what]()
+
+
+@pytest.mark.parametrize(("what", "sentence"), [
+    ("id", "1.png has 72 pixels with an id or colour that the class table of 2 classes does not have"),
+    ("label size", "1.png is 9x4, but"), ("image size", "1.png is 9x4, but"), ("image", "1.png cannot be used"),
+    ("table", "have no class table; give --classes FILE"), ("names", "but none of equal name"),
+    ("labels", "holds no log"), ("two", "have one name"),
+])  # fmt: skip
+def test_image_folders_that_cannot_be(tmp_path: Path, what: str, sentence: str) -> None:
+    """One sentence, in which the file is named."""
+    folder = _image_folder(tmp_path / "data")
+    _spoil(folder, what)
+    with pytest.raises(StsemError) as said:
+        open_source([str(folder)], Reading(tmp_path / "cache")).pairs.pair(0)
+    assert sentence in str(said.value)
+
+
+def test_logs_without_what_is_needed(tmp_path: Path) -> None:
+    """No labels; no depth where the network wants it."""
+    log = write_walk(tmp_path / "walk.mcap", truth=None, depth=None)
+    with pytest.raises(TrainingError, match="no frame with labels"):
+        open_source([str(log)], Reading(tmp_path / "cache"))
+    with pytest.raises(TrainingError, match="no depth"):
+        open_source([str(log)], Reading(tmp_path / "cache", depth=True))
+
+
+def test_pairs_need_a_table_that_counts_from_zero(tmp_path: Path) -> None:
+    """In the folder, or given."""
+    save_pair(tmp_path / "0.npz", pair(0))
+    table = tmp_path / "table.json"
+    with pytest.raises(ClassTableError, match="no class table"):
+        open_source([str(tmp_path)], Reading(tmp_path / "cache"))
+    table.write_text('["dark", "red", "green"]')
+    assert len(open_source([str(tmp_path)], Reading(tmp_path, table)).pairs) == 1
+    table.write_text(json.dumps({"1": "dark", "2": "red"}))
+    with pytest.raises(StsemError, match="counts from 0"):
+        open_source([str(tmp_path)], Reading(tmp_path, table))
+
+
+OFFICE = ClassSet(("office chair", "Desk", "stool", "wall"), ((1, 0, 0), (2, 0, 0), (3, 0, 0), (4, 0, 0)))
+
+
+def test_class_maps() -> None:
+    """Two become one, one is not learned, the rest stays; colours go along."""
+    class_map = {"Office Chair": "chair", "stool": "chair", "wall": ""}
+    classes = network_classes(OFFICE, class_map)
+    assert classes == ClassSet(("chair", "Desk"), ((1, 0, 0), (2, 0, 0)))
+    table = lookup(OFFICE, classes, class_map, "x")
+    assert table[:4].tolist() == [0, 1, 0, NO_LABEL]
+    assert (table[4:] == NO_LABEL).all()
+    with pytest.raises(ClassTableError, match="names 'sofa'"):
+        network_classes(OFFICE, {"sofa": "chair"})
+    with pytest.raises(ClassTableError, match=r"first data does not have .*stool"):
+        lookup(OFFICE, classes, {"wall": ""}, "b.mcap")
+
+
+def test_class_map_files(tmp_path: Path) -> None:
+    """Names to names."""
+    path = tmp_path / "map.toml"
+    for text, sentence in (("a = 1", "no class name for 'a'"), ("a = ", "not valid TOML")):
+        path.write_text(text)
+        with pytest.raises(ClassTableError, match=sentence):
+            read_class_map(path)
+    path.write_text('"office chair" = "chair"')
+    assert read_class_map(path) == {"office chair": "chair"}
+
+
+def test_data_is_joined_in_the_networks_ids(tmp_path: Path) -> None:
+    """Two logs whose tables have another order: the same picture has the same labels."""
+    logs = [write_walk(tmp_path / "a.mcap", frames=3), write_walk(tmp_path / "b.mcap", frames=4,
+            names={0: "wall", 1: "door", 2: "FLOOR"})]  # fmt: skip
+    sources = [open_source([str(log)], Reading(tmp_path / "cache")) for log in logs]
+    classes = classes_of(sources, {})
+    pairs = join(sources, classes, {})
+    assert (classes.names, len(pairs)) == (("wall", "floor", "door"), 2 + 3)
+    raw = sources[1].pairs.pair(0).labels
+    expected = np.array([0, 2, 1, *[255] * 253], np.uint8)[raw]
+    assert np.array_equal(pairs.pair(2).labels, expected)
+    assert replace(sources[0], pairs=pairs).pairs.fingerprint != sources[0].pairs.fingerprint
