@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import onnx
+import onnxruntime
 from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, QuantFormat, QuantType, quantize_static
 from onnxruntime.quantization import quant_pre_process as fold
 
@@ -23,6 +24,8 @@ from stsem.inference.preprocess import Tensor, network_inputs
 from stsem.inference.variant import INT8, MADE_FROM, at_precision, variant_path
 
 FEWEST_FRAMES = 2
+_WARNINGS, _ERRORS = 2, 3
+"""Severities of ONNX Runtime's logger, the first its own choice."""
 _OPSET = 13
 """The first in which weights can have a scale per channel."""
 _REFUSALS = (*FAILURES, onnx.version_converter.ConvertError, ValueError, TypeError, KeyError, AttributeError)
@@ -150,7 +153,9 @@ def _quiet() -> Iterator[None]:
     """ONNX Runtime's advice on its own steps is not the user's."""
     before: Any = logging.root.manager.disable
     logging.disable(logging.WARNING)
+    onnxruntime.set_default_logger_severity(_ERRORS)
     try:
         yield
     finally:
         logging.disable(before)
+        onnxruntime.set_default_logger_severity(_WARNINGS)
