@@ -5,7 +5,8 @@ import numpy as np
 from stsem.chance import generator
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.frame import Image
-from stsem.report.inputs import StripFrame
+from stsem.report.inputs import StripFrame, UnsureFrame
+from stsem.uncertainty import MEASURES, Uncertainty
 
 CLASSES = (
     "bed",
@@ -32,6 +33,15 @@ def strip_frame(index: int, truth: bool) -> StripFrame:
     keyframe[:, :shift] = NO_LABEL
     answers = {"per-frame": _blurred(labels, index), "keyframe": _blurred(keyframe, index + 1000)}
     return StripFrame(index, picture(labels, index), labels if truth else None, answers, {"keyframe": index % 6})
+
+
+def unsure_frame(index: int, truth: bool) -> UnsureFrame:
+    """The network's own answer to a frame, and doubts that grow towards the right."""
+    frame = strip_frame(index, truth)
+    levels = np.broadcast_to(np.linspace(0, 200, 480).astype(np.uint8), (3, 270, 480))
+    said = Uncertainty(MEASURES, levels, len(CLASSES))
+    confidence = np.broadcast_to(np.linspace(1, 0.25, 480, dtype=np.float32), (270, 480))
+    return UnsureFrame("per-frame", index, frame.image, frame.truth, frame.answers["per-frame"], confidence, said)
 
 
 def scene(index: int) -> Labels:

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 from made_up_origin import host, identity, made_up_input
-from made_up_pictures import CLASSES, strip_frame
+from made_up_pictures import CLASSES, strip_frame, unsure_frame
 from made_up_schedule import COST_MS, FIRST_NS, FRAMES, MODES, PERIOD_NS, offline, schedule
 
 from stsem.chance import generator
 from stsem.classes import ClassSet
 from stsem.document.accuracy import Coverage, DistanceRow, DistanceSummary, Loss, LossParts, Score
+from stsem.document.calibration import Calibration, ErrorDetection, Judged, ReliabilityBin
 from stsem.document.canonical import sealed
 from stsem.document.schema import Comparison, ComparisonRow, Document, Run, Verdict
 from stsem.document.timing import PERCENTILES, Distribution, Latency, Outcomes, StageLatency, Throughput
@@ -55,10 +56,12 @@ def example(*, truth: bool = True, lossy: bool = False, clock: bool = True, pict
     )
     strip = tuple(strip_frame(i, truth) for i in (12, 47, 90, 131)) if pictures else ()
     trace = _write_trace if clock else None
+    unsure = unsure_frame(90, truth) if pictures else None
     return ReportInputs(
         sealed(document),
         {mode: [row for row in rows if row.mode == mode] for mode in MODES},
         strip,
+        unsure=unsure,
         trace=trace,
         trajectory=[b"# stamp x y z qx qy qz qw\n"],
         answer_classes=ClassSet(CLASSES),
@@ -149,6 +152,8 @@ def _run(mode: str, rows: list[FrameRow], truth: bool, clock: bool) -> Run:
         )
         if truth and mode == "keyframe"
         else None,
+        calibration=_calibration(mode) if truth else {},
+        error_detection=_detection() if truth else None,
         latency_ms=_latency(rows) if clock else None,
         throughput=_throughput(rows) if clock else None,
         not_measured={
@@ -187,6 +192,30 @@ def _by_distance() -> tuple[DistanceRow, ...]:
         )
         for d, count in enumerate(n)
     )
+
+
+def _calibration(mode: str) -> dict[str, Calibration]:
+    parts: dict[str, Judged] = {"segmented": "offline"}
+    if mode == "keyframe":
+        parts |= {"propagated": "offline", "delivered": "delivered"}
+    return {name: _reliability(judged, 0.04 * (name == "propagated")) for name, judged in parts.items()}
+
+
+def _reliability(judged: Judged, worse: float) -> Calibration:
+    pixels = [0, 0, 90, 400, 900, 2_000, 4_000, 8_000, 12_000, 20_000, 30_000, 50_000, 80_000, 120_000, 900_000]
+    middles = [(i + 0.5) / 15 for i in range(15)]
+    bins = tuple(
+        ReliabilityBin(lower=i / 15, upper=(i + 1) / 15, pixels=n, confidence=middle if n else None,
+                       accuracy=min(1.0, middle + 0.06 - worse) if n else None)
+        for i, (n, middle) in enumerate(zip(pixels, middles, strict=True))
+    )  # fmt: skip
+    return Calibration(judged=judged, ece=0.06 - worse, mce=0.06, confidence=0.9, accuracy=0.95 - worse,
+                       pixels=sum(pixels), n=26, bins=bins)  # fmt: skip
+
+
+def _detection() -> ErrorDetection:
+    auc = {"one_minus_confidence": 0.91, "variance": 0.85, "entropy": 0.88, "mutual_information": 0.86}
+    return ErrorDetection(judged="offline", auc=auc, wrong_share=0.05, pixels=1_227_390, n=26)
 
 
 def _outcomes(results: list[FrameResult]) -> Outcomes:

@@ -26,9 +26,9 @@ def names(folder: Path) -> list[str]:
 
 def test_folder_holds_everything(written: Path) -> None:
     assert names(written) == [
-        "frames.csv", "map.ply", "plots/classes.png", "plots/distance.png", "plots/latency.png", "plots/loss.png",
-        "plots/overview.png", "plots/strip.png", "plots/timeline.png", "report.html", "report.json", "report.md",
-        "trace.json", "trajectory.txt",
+        "frames.csv", "map.ply", "plots/calibration.png", "plots/classes.png", "plots/distance.png",
+        "plots/latency.png", "plots/loss.png", "plots/overview.png", "plots/strip.png", "plots/timeline.png",
+        "plots/uncertainty.png", "report.html", "report.json", "report.md", "trace.json", "trajectory.txt",
     ]  # fmt: skip
     document = read_document(written)
     assert document == example(pictures=False).document
@@ -44,7 +44,7 @@ def test_two_replays_give_the_same_bytes(written: Path, tmp_path: Path) -> None:
     cloud.write_bytes(b"ply\n")
     again = write_folder(replace(example(), point_cloud=cloud), tmp_path / "again")
     assert first_differences(repeatable_files(written), repeatable_files(again)) == ()
-    assert len(repeatable_files(again)) == 12
+    assert len(repeatable_files(again)) == 14
     for name in names(written):
         assert (written / name).read_bytes() == (again / name).read_bytes()
 

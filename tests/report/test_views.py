@@ -119,10 +119,11 @@ def test_both_views_say_the_same(views: tuple[ReportInputs, str, str]) -> None:
 
 def test_reading_order_and_basis() -> None:
     """From the verdict down; every table of scores has notes that define them."""
-    report = outline(example(pictures=False).document, frozenset({"strip"}))
+    report = outline(example(pictures=False).document, frozenset({"strip", "uncertainty"}))
     titles = [section.title for section in report.sections]
     wanted = ["Comparison", "Where the mIoU is lost", "By distance to the keyframe", "Latency and throughput",
-              "What became of the frames", "Classes", "Frames", "Not measured", "Input", "Reproduce"]  # fmt: skip
+              "What became of the frames", "Classes", "Confidence", "Uncertainty", "Frames", "Not measured", "Input",
+              "Reproduce"]  # fmt: skip
     assert all(titles.index(a) < titles.index(b) for a, b in pairwise(wanted))
     first: Section = report.sections[0]
     table = first.blocks[0]
@@ -228,8 +229,8 @@ def test_drawn_pictures_stand_inline_and_follow_the_theme(written: Path) -> None
     page = (written / "report.html").read_text()
     assert "xlink:href" in page
     drawn = re.findall(r"<svg .*?</svg>", page, flags=re.DOTALL)
-    assert len(drawn) == 6
-    assert page.count("data:image/png;base64,") == 1
+    assert len(drawn) == 7
+    assert page.count("data:image/png;base64,") == 2
     for picture in drawn:
         check(picture)
         assert "<metadata" not in picture
@@ -247,7 +248,7 @@ def test_png_has_no_date(written: Path) -> None:
 
 
 def test_pictures_are_left_out_where_there_is_nothing_to_show() -> None:
-    assert list(draw_all(example(truth=False))) == ["latency", "timeline", "strip"]
+    assert list(draw_all(example(truth=False))) == ["latency", "timeline", "uncertainty", "strip"]
     assert "latency" not in draw_all(example(truth=False, clock=False, pictures=False))
 
 

@@ -40,7 +40,7 @@ def draw(inputs: ReportInputs) -> Figure | None:
     for place, (heading, caption, values) in enumerate(maps, start=_COLUMNS + 1):
         axes = figure.add_subplot(2, _COLUMNS, place)
         low, high = _range(values)
-        axes.imshow(values, cmap=_MAP_COLOURS, vmin=low, vmax=high, interpolation="nearest")
+        axes.imshow(values, cmap=_MAP_COLOURS, vmin=low, vmax=high if high > low else low + 1, interpolation="nearest")
         _frame_of(axes, heading, caption)
     seen = sorted({int(k) for labels in (frame.truth, frame.labels) if labels is not None for k in np.unique(labels)})
     handles = [Patch(color=palette[k] / 255, label=classes.names[k]) for k in seen if k < len(classes)]
@@ -85,9 +85,9 @@ def _maps(frame: UnsureFrame, run: Run | None) -> Iterator[tuple[str, str, npt.N
 
 
 def _range(values: npt.NDArray[np.float64]) -> tuple[float, float]:
-    """All but the lowest and the highest hundredth, never empty."""
-    low, high = np.quantile(values, (0.01, 0.99))
-    return float(low), max(float(high), float(low) + 1e-9)
+    """All but the lowest and the highest hundredth."""
+    low, high = np.quantile(values, (0.01, 0.99)).tolist()
+    return low, high
 
 
 def _scale(figure: Figure) -> None:
