@@ -4,7 +4,7 @@ python -m bench.paper table1                                        # 3 seeds; t
 python -m bench.paper table1 table2 table3 --jobs 2                 # cells that tables share are trained once
 python -m bench.paper table1 --data camvid=../shared/logs/camvid-0016E5-15hz.mcap
 python -m bench.paper --cell sum/0                                  # one cell by itself, and what it starts from
-python -m bench.paper table1 table2 table3 --publish                # results and tables into the tree
+python -m bench.paper --publish --data camvid                       # what is done into bench/paper/results and docs
 """
 
 import argparse
@@ -27,9 +27,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run what is asked for; 0, or 1 with one sentence."""
     parser = _parser()
     given = parser.parse_args(arguments)
-    if not (given.tables or given.cell):
+    if not (given.tables or given.cell or given.publish):
         parser.error(f"name a table ({', '.join(TABLES)}) or a --cell")
     try:
+        if given.publish:
+            _publish(given.data.partition("=")[0], given.out)
+            return 0
         data = find_data(given.data, given.out, OFFICES)
         cells = _cells(given, data)
         if given.list:
@@ -55,10 +58,16 @@ def _cells(given: argparse.Namespace, data: Data) -> list[Cell]:
     return with_starts(sorted(wanted, key=lambda cell: cell.seed))
 
 
+def _publish(data: str, out: Path) -> None:
+    from bench.paper.document import publish
+
+    say(f"{publish(out, data)} results of {data} are in the tree, and docs/paper-tables.md says what they say")
+
+
 def _all(given: argparse.Namespace, cells: list[Cell], data: Data) -> None:
     """Prepare the data, run the cells that have no result, write the tables."""
     from bench.paper.cell import is_done
-    from bench.paper.document import publish, write_tables
+    from bench.paper.document import write_tables
     from bench.paper.facts import facts_of
     from bench.paper.schedule import Board, run_cells
 
@@ -69,8 +78,6 @@ def _all(given: argparse.Namespace, cells: list[Cell], data: Data) -> None:
     say(f"{len(missing)} of {len(cells)} cells are to be trained")
     board = Board({cell: _work(cell, data) for cell in missing}, say)
     run_cells(missing, lambda cell: child_command(cell, given.data, given.out), given.jobs, board)
-    if given.publish:
-        publish(given.out, data.name)
     for path in write_tables(given.out, data.name, given.tables):
         say(f"\n{path}\n\n{path.read_text(encoding='utf-8')}")
 
@@ -113,7 +120,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--cell", help="train this one alone, and what it starts from")
     parser.add_argument("--list", action="store_true", help="print the cells and stop")
-    parser.add_argument("--publish", action="store_true", help="results into bench/paper/results, tables into docs")
+    parser.add_argument("--publish", action="store_true", help="train nothing: results into the tree, tables into docs")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
     return parser
 

@@ -113,11 +113,14 @@ def find_data(given: str, out: Path, offices: Path) -> Data:
 
 
 _NOWHERE = Path()
-_ROAD = ("Road", "Pole"), ("road", "pole")
 _DATA = {
-    "offices": Data("offices", _NOWHERE, None, OFFICE, (233, 137), ("floor", "lamp"), Place(0, 0), (1200, 400), True),
-    "camvid": Data("camvid", _NOWHERE, None, recorded.CAMVID, (185, 137), _ROAD[0], Place(1, 1), (300, 100)),
-    "cityscapes": Data("cityscapes", _NOWHERE, None, CITYSCAPES, (281, 137), _ROAD[1], Place(1, None), (1200, 400)),
+    "offices": Data(
+        "offices", _NOWHERE, None, OFFICE, (233, 137), ("floor", "lamp"), Place(0, 0), (1200, 400), depth=True
+    ),
+    "camvid": Data("camvid", _NOWHERE, None, recorded.CAMVID, (185, 137), ("Road", "Pole"), Place(1, 1), (300, 100)),
+    "cityscapes": Data(
+        "cityscapes", _NOWHERE, None, CITYSCAPES, (281, 137), ("road", "pole"), Place(1, None), (1200, 400)
+    ),
 }
 
 

@@ -25,13 +25,24 @@ def write_tables(out: Path, data: str, tables: Iterable[str]) -> list[Path]:
     return written
 
 
-def publish(out: Path, data: str) -> None:
-    """Results under `out` into the tree, and the document's parts from all that is there then."""
+def publish(out: Path, data: str) -> int:
+    """Results under `out` into the tree, and the document's parts from all that is there then.
+
+    Returns:
+        How many results.
+
+    Raises:
+        UsageError: there are none.
+    """
+    found = sorted((out / "results" / data).glob("*.json"))
+    if not found:
+        raise UsageError(f"There is no result of {data!r} under {out}; train its cells first.")
     folder = COMMITTED / data
     folder.mkdir(parents=True, exist_ok=True)
-    for path in sorted((out / "results" / data).glob("*.json")):
+    for path in found:
         _write(folder / path.name, path.read_text(encoding="utf-8"))
     _write(DOCUMENT, filled(DOCUMENT.read_text(encoding="utf-8"), COMMITTED))
+    return len(found)
 
 
 def filled(text: str, results: Path) -> str:

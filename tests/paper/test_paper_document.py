@@ -109,9 +109,11 @@ def test_results_into_the_tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     document.write_text("<!-- offices cells -->\n<!-- end -->\n")
     monkeypatch.setattr("bench.paper.document.DOCUMENT", document)
     monkeypatch.setattr("bench.paper.document.COMMITTED", tmp_path / "kept")
-    publish(tmp_path / "out", "offices")
+    assert publish(tmp_path / "out", "offices") == len(ALL)
     assert load(tmp_path / "kept" / "offices") == load(folder)
     assert "| `sum-one` | a | 7 |" in document.read_text()
+    with pytest.raises(UsageError, match="no result of 'camvid'"):
+        publish(tmp_path / "out", "camvid")
     assert [path.name for path in write_tables(tmp_path / "out", "offices", ["table1"])] == ["offices-table1.md"]
 
 
