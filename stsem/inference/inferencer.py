@@ -113,6 +113,8 @@ class Inferencer:
                 f"The network {name} returned labels of shape {labels.shape} and confidence of shape "
                 f"{confidence.shape}; its sidecar's size calls for ({height}, {width})."
             )
+        if labels.dtype != np.uint8:
+            labels = np.where(labels < 0, NO_LABEL, labels)
         known = labels[labels != NO_LABEL] if labels.max() >= count else labels
         if known.size and known.max() >= count:
             raise NetworkError(
@@ -122,7 +124,7 @@ class Inferencer:
         if not -1e-3 <= low <= high <= 1 + 1e-3:  # also false for NaN
             raise NetworkError(f"The network {name} returned a confidence from {low:g} to {high:g}; expected 0 to 1.")
         steps = np.rint(confidence.clip(0, 1) * CONFIDENCE_STEPS).astype(np.uint8)
-        return Output(labels, steps, uncertainty)
+        return Output(labels.astype(np.uint8, copy=False), steps, uncertainty)
 
 
 def segmentation(output: Output, size: tuple[int, int]) -> Segmentation:

@@ -21,7 +21,10 @@ CLASS_COUNT = "stsem.class_count"
 CHANNELS = {"image": 3, "difference": 3, "depth": 1}
 """Inputs there can be: name -> channels; each (1, channels, H, W) float32."""
 
-_FLOAT, _UINT8 = "tensor(float)", "tensor(uint8)"
+_FLOAT = ("tensor(float)",)
+_WHOLE = ("tensor(uint8)", "tensor(int64)", "tensor(int32)")
+"""Types of labels; the first is the one to have, the others are narrowed behind the graph."""
+_ADOPT = "`stsem adopt` makes such a file fit"
 
 
 class OutputKind(StrEnum):
@@ -147,7 +150,7 @@ def _check_inputs(signature: Signature, sidecar: Sidecar, path: Path) -> None:
     if got != wanted:
         raise NetworkError(
             f"The network {path} has the inputs {_listed(got)}, but its sidecar calls for {_listed(wanted)}; "
-            "the sections [difference] and [depth] of the sidecar stand for the inputs of these names."
+            f"the sections [difference] and [depth] stand for the inputs of these names, and {_ADOPT}."
         )
     width, height = sidecar.size
     for port in signature.inputs:
@@ -163,14 +166,15 @@ def _output_kind(signature: Signature, sidecar: Sidecar, path: Path) -> OutputKi
             f"The network {path} tells {stated} classes apart, but its sidecar names {len(sidecar.classes)}."
         )
     if {"labels", "confidence"} <= ports.keys():
-        _check_port(ports["labels"], _UINT8, (1, height, width), path)
+        _check_port(ports["labels"], _WHOLE, (1, height, width), path)
         _check_port(ports["confidence"], _FLOAT, (1, height, width), path)
         return OutputKind.LABELS
     if "logits" in ports:
         _check_port(ports["logits"], _FLOAT, (1, len(sidecar.classes), None, None), path)
         return OutputKind.LOGITS
     raise NetworkError(
-        f"The network {path} has the outputs {_listed(ports)}; expected 'labels' and 'confidence', or 'logits'."
+        f"The network {path} has the outputs {_listed(ports)}; expected 'labels' and 'confidence', or 'logits'; "
+        f"{_ADOPT}."
     )
 
 
@@ -183,15 +187,15 @@ def _measures(signature: Signature, sidecar: Sidecar, path: Path) -> tuple[str, 
     return found
 
 
-def _check_port(port: Port, type_: str, shape: tuple[int | None, ...], path: Path) -> None:
+def _check_port(port: Port, types: tuple[str, ...], shape: tuple[int | None, ...], path: Path) -> None:
     """A side that either the file or we leave open fits anything."""
     fits = len(port.shape) == len(shape) and all(
         a is None or b is None or a == b for a, b in zip(port.shape, shape, strict=False)
     )
-    if port.type != type_ or not fits:
+    if port.type not in types or not fits:
         raise NetworkError(
             f"The network {path} has {port.name!r} as {port.type} of shape {_shape(port.shape)}; "
-            f"with its sidecar's size and classes, {type_} of shape {_shape(shape)} is expected."
+            f"with its sidecar's size and classes, {types[0]} of shape {_shape(shape)} is expected; {_ADOPT}."
         )
 
 

@@ -116,6 +116,14 @@ def _wide_labels() -> onnx.ModelProto:
     return _model(nodes, ["image"], {**_LABELS, "labels": (TensorProto.INT64, [1, HEIGHT, WIDTH])})
 
 
+def _negative_labels() -> onnx.ModelProto:
+    """The same less 1."""
+    one = helper.make_node("Constant", [], ["one"], value=helper.make_tensor("one", TensorProto.INT64, [], [1]))
+    nodes = [_axes(), one, helper.make_node("ArgMax", ["image"], ["ids"], axis=1, keepdims=0),
+             helper.make_node("Sub", ["ids", "one"], ["labels"]), _answer("image")[2]]  # fmt: skip
+    return _model(nodes, ["image"], {**_LABELS, "labels": (TensorProto.INT64, [1, HEIGHT, WIDTH])})
+
+
 def _other_output() -> onnx.ModelProto:
     return _model(
         [helper.make_node("Relu", ["image"], ["out"])], ["image"], {"out": (TensorProto.FLOAT, [1, 3, HEIGHT, WIDTH])}
@@ -147,6 +155,7 @@ GRAPHS: dict[str, Callable[[], onnx.ModelProto]] = {
     "logits": _logits,
     "unsure": _unsure,
     "wide labels": _wide_labels,
+    "negative labels": _negative_labels,
     "other output": _other_output,
     "other input": _other_input,
     "nan": _nan_confidence,

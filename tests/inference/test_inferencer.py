@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stsem.classes import NO_LABEL
 from stsem.errors import NetworkError, UsageError
 from stsem.frame import Frame, Image
 from stsem.inference.inferencer import Inferencer
@@ -31,6 +32,17 @@ def test_labels_come_back_at_the_size_of_the_image(files: Files) -> None:
     assert answer.labels.dtype == np.uint8
     assert (answer.labels[:, :16] == 0).all()
     assert (answer.labels[:, 16:] == 2).all()
+
+
+def test_wide_labels_are_narrowed(files: Files) -> None:
+    """int64, as argmax gives them."""
+    answer = Inferencer(load_network(files("wide labels")), threads=1).infer(Frame(0, 0, _halves(0, 2)))
+    assert answer.labels.dtype == np.uint8
+    assert (answer.labels[:, :16] == 0).all()
+    assert (answer.labels[:, 16:] == 2).all()
+    unknown = Inferencer(load_network(files("negative labels")), threads=1).infer(Frame(0, 0, _halves(0, 2)))
+    assert (unknown.labels[:, :16] == NO_LABEL).all()
+    assert (unknown.labels[:, 16:] == 1).all()
 
 
 def test_confidence_is_in_steps(files: Files) -> None:

@@ -23,6 +23,7 @@ def test_a_network_describes_itself(files: Files) -> None:
     assert network.output is OutputKind.LABELS
     assert network.model_sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert load_network(files("logits")).output is OutputKind.LOGITS
+    assert load_network(files("wide labels")).output is OutputKind.LABELS
 
 
 def test_the_fingerprint_covers_both_files(files: Files) -> None:
@@ -50,7 +51,7 @@ def test_a_network_with_depth(files: Files) -> None:
         ("depth", WITH_DIFFERENCE + "[depth]\n", {}, "its sidecar calls for 'depth', 'difference', 'image'"),
         ("other input", SIDECAR, {}, "has the inputs 'input'"),
         ("other output", SIDECAR, {}, "has the outputs 'out'; expected 'labels' and 'confidence', or 'logits'"),
-        ("wide labels", SIDECAR, {}, "'labels' as tensor(int64) of shape (1, 12, 16)"),
+        ("wide labels", SIDECAR.replace("16, 12", "12, 16"), {}, "'image' as tensor(float) of shape (1, 3, 12, 16)"),
         ("labels", SIDECAR.replace("16, 12", "12, 16"), {}, "(1, 3, 16, 12) is expected"),
         ("logits", SIDECAR.replace(', "blue"', ""), {}, "(1, 2, any, any) is expected"),
         ("labels", SIDECAR, {"stsem.class_count": "13"}, "tells 13 classes apart, but its sidecar names 3"),
