@@ -18,8 +18,7 @@ from stsem.train.dataset import Pairs, save_pair
 from stsem.train.log_pairs import decode_log
 from stsem.train.sources import Reading, classes_of, join, open_source
 from stsem.train.vocabulary import lookup, network_classes, read_class_map
-
-from tests.made_up_walk import NAMES, write_walk  # isort: skip
+from tests.made_up_walk import NAMES, write_walk
 
 from .squares import pair
 
