@@ -64,23 +64,26 @@ def run_cells(cells: Sequence[Cell], command: Callable[[Cell], list[str]], jobs:
         board: is told.
 
     Raises:
-        TrainingError: a cell failed; those that run end first.
+        TrainingError: cells failed; all that do not start from them are done first.
     """
-    waiting, running = list(cells), dict[Future[None], Cell]()
+    waiting, unfinished = list(cells), set(cells)
+    running, failures = dict[Future[None], Cell](), list[str]()
     with ThreadPoolExecutor(jobs) as pool:
-        while waiting or running:
-            for cell in [c for c in waiting if _ready(c, waiting, running)][: jobs - len(running)]:
+        while True:
+            ready = [cell for cell in waiting if unfinished.isdisjoint(cell.starts.values())]
+            for cell in ready[: jobs - len(running)]:
                 waiting.remove(cell)
                 running[pool.submit(_run, cell, command(cell), board)] = cell
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
-                del running[future]
-                future.result()
-
-
-def _ready(cell: Cell, waiting: Sequence[Cell], running: dict[Future[None], Cell]) -> bool:
-    unfinished = {*waiting, *running.values()}
-    return not any(start in unfinished for start in cell.starts.values())
+            if not running:
+                break
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                cell = running.pop(future)
+                if error := future.exception():
+                    failures.append(str(error))  # what starts from it never becomes ready
+                else:
+                    unfinished.remove(cell)
+    if failures:
+        raise TrainingError(" ".join(failures))
 
 
 def _run(cell: Cell, arguments: list[str], board: Board) -> None:

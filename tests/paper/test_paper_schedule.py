@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.paper.plan import find_cell
+from bench.paper.plan import Cell, find_cell
 from bench.paper.schedule import Board, run_cells
 from stsem.errors import TrainingError
 
@@ -73,9 +73,16 @@ def test_killed_between_cells_it_goes_on(tmp_path: Path) -> None:
 
 
 def test_a_cell_that_fails_is_named_with_its_last_words(tmp_path: Path) -> None:
-    with pytest.raises(TrainingError, match=r"spatial-first/0 failed \(no room\)"):
-        run_cells(CELLS, lambda cell: ["-c", "print('no room'); raise SystemExit(1)"], 1,
-                  Board(dict.fromkeys(CELLS, 1.0), lambda _: None))  # fmt: skip
+    """What does not start from it is done all the same."""
+
+    def command(cell: Cell) -> list[str]:
+        if cell.key == "temporal-first/0":
+            return ["-c", "print('no room'); raise SystemExit(1)"]
+        return ["-c", CHILD, str(tmp_path), cell.key]
+
+    with pytest.raises(TrainingError, match=r"temporal-first/0 failed \(no room\)"):
+        run_cells(CELLS, command, 2, Board(dict.fromkeys(CELLS, 1.0), lambda _: None))
+    assert {path.stem for path in tmp_path.glob("*.json")} == {"spatial-first-0", "spatial-first-1", "spatial-0"}
 
 
 def test_time_left_counts_the_work_and_not_the_cells() -> None:
