@@ -9,6 +9,7 @@ Layouts 0 to 999 train the shipped network and 5000 to 5099 validate it, 20000 t
 """
 
 import argparse
+import json
 from pathlib import Path
 
 import cv2
@@ -25,6 +26,7 @@ from stsem.synth.path import pose_at, profile, walk
 from stsem.synth.scene import Scene
 from stsem.synth.sensor import expose, kinect
 from stsem.synth.view import View
+from stsem.synth.vocabulary import OFFICE
 from stsem.train.dataset import Pair, save_pair
 
 FOCALS_PER_WIDTH = 250 / 480, 400 / 480
@@ -139,6 +141,8 @@ if __name__ == "__main__":
     parser.add_argument("--depth", action="store_true", help="keep the depth that a Kinect would measure")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
+    table = {"names": OFFICE.names, "colours": OFFICE.colours}
+    (given.folder / "classes.json").write_text(json.dumps(table), encoding="utf-8")
     for number in range(*given.layouts):
         render(number, given.pairs, given.folder, tuple(given.size), depth=given.depth)
         print(number, flush=True)

@@ -1,7 +1,6 @@
-"""How the shipped network is made: train on rendered pairs, publish, judge. See docs/training.md for the commands.
+"""How the shipped network is published and judged; `stsem train` trains it. See docs/training.md for the commands.
 
-python bench/train_default.py train   --pairs .scratch/pairs --checkpoint .scratch/a.pt --crop 329 185 --iterations 4000
-python bench/train_default.py publish --checkpoint .scratch/a.pt --size 473 281 --out default.onnx
+python bench/train_default.py publish --checkpoint .scratch/a/fused/checkpoint.pt --size 617 377 --out default.onnx
 python bench/train_default.py judge   --network default --pairs .scratch/validation
 python bench/train_default.py judge   --network default --log logs/office.mcap
 """
@@ -26,45 +25,14 @@ from stsem.log.log import open_log
 from stsem.metrics.confusion import ConfusionMatrix
 from stsem.models.two_stream import PredictionFusion, prediction_sum
 from stsem.synth.vocabulary import OFFICE
-from stsem.train.augment import Augmentation
-from stsem.train.dataset import PairFolder, class_shares
-from stsem.train.loop import Progress, Schedule, Training
-from stsem.train.objective import Objective, class_weights
+from stsem.train.dataset import PairFolder
 from stsem.train.publish import load_checkpoint, publish
 
-ARCHITECTURE = "pspnet-r18-w4-w2"
 MEAN, STD, SCALE = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225), 4.0
 
 
 def _sidecar(size: tuple[int, int], note: str = "") -> Sidecar:
     return Sidecar(size, MEAN, STD, OFFICE, Difference(SCALE), note)
-
-
-def _train(args: argparse.Namespace) -> None:
-    set_threads(1)
-    torch.set_num_threads(1)  # the workers are the parallelism
-    pairs = PairFolder(args.pairs, args.prefix)
-    crop = tuple(args.crop)
-    schedule = Schedule(
-        args.iterations, batch=args.batch, rate=args.rate, warm_up=args.warm_up, seed=args.seed, workers=args.threads
-    )
-    objective = Objective(class_weights(class_shares(pairs, len(OFFICE))), bf16=args.bf16)
-    how = Augmentation(crop, tuple(args.scales), plain=args.plain)
-    training = Training(args.architecture, _sidecar(crop), objective, how, schedule)
-    if args.checkpoint.is_file():
-        training.resume(args.checkpoint)
-    elif args.init:
-        training.start_from(args.init)
-    print(f"{len(pairs)} pairs, from iteration {training.iteration}", flush=True)
-    begun, first = hostclock.wall_ns(), training.iteration
-
-    def report(now: Progress) -> None:
-        seconds = (hostclock.wall_ns() - begun) / 1e9
-        left = seconds / (now.iteration - first) * (now.iterations - now.iteration)
-        where = f"{now.iteration}/{now.iterations} loss {now.loss:.4f} rate {now.rate:.2e}"
-        print(f"{where}, {seconds:.0f} s, {left:.0f} s left", flush=True)
-
-    training.run(pairs, args.checkpoint, report)
 
 
 def _publish(args: argparse.Namespace) -> None:
@@ -137,19 +105,6 @@ def _streams(args: argparse.Namespace) -> None:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     verbs = parser.add_subparsers(required=True)
-    train = verbs.add_parser("train")
-    train.set_defaults(run=_train)
-    train.add_argument("--architecture", default=ARCHITECTURE)
-    train.add_argument("--init", type=Path, help="begin with the weights of this checkpoint")
-    train.add_argument("--crop", type=int, nargs=2, default=(329, 185))
-    train.add_argument("--scales", type=float, nargs=2, default=(1.0, 2.0))
-    train.add_argument("--iterations", type=int, required=True)
-    train.add_argument("--batch", type=int, default=8)
-    train.add_argument("--rate", type=float, default=2e-3)
-    train.add_argument("--warm-up", type=int, default=200)
-    train.add_argument("--seed", type=int, default=0)
-    train.add_argument("--bf16", action="store_true")
-    train.add_argument("--plain", action="store_true")
     export = verbs.add_parser("publish")
     export.set_defaults(run=_publish)
     export.add_argument("--size", type=int, nargs=2, default=(473, 281))
@@ -163,9 +118,9 @@ def _arguments() -> argparse.Namespace:
     streams.add_argument("--size", type=int, nargs=2, default=(473, 281))
     for verb in (judge, streams):
         verb.add_argument("--log", type=Path)
-    for verb in (train, export, streams):
+    for verb in (export, streams):
         verb.add_argument("--checkpoint", type=Path, required=True)
-    for verb in (train, judge, streams):
+    for verb in (judge, streams):
         verb.add_argument("--pairs", type=Path)
         verb.add_argument("--prefix", default="")
         verb.add_argument("--threads", type=int, default=2)

@@ -69,6 +69,10 @@ def train(
         float | None, _option("--rate", panel=_RECIPE, metavar="R", help="Largest learning rate; fused in proportion.")
     ] = None,
     crop: Annotated[str | None, _option("--crop", panel=_RECIPE, metavar="WxH", help="Size of a view.")] = None,
+    set_: Annotated[
+        list[str] | None,
+        _option("--set", panel=_RECIPE, metavar="KEY=VALUE", help="Any number of the recipe: 'scales=[1, 1.7]'."),
+    ] = None,
     seed: Annotated[int, _option("--seed", panel=_RECIPE, metavar="N", help="Of every draw. [0]")] = 0,
     device: Annotated[str, _option("--device", panel=_MACHINE, help="auto, cpu or cuda. [auto]")] = "auto",
     precision: Annotated[
@@ -89,7 +93,7 @@ def train(
         Wanted(
             data=tuple(data), validation=tuple(validation or ()), out=out, architecture=architecture, weights=weights,
             size=size, classes=classes, class_map=class_map, topics=tuple(topic or ()), recipe=recipe, stages=stages,
-            iterations=iterations, batch=batch, rate=rate, crop=crop, seed=seed, device=device, precision=precision,
+            iterations=iterations, batch=batch, rate=rate, crop=crop, assignments=tuple(set_ or ()), seed=seed, device=device, precision=precision,
             workers=workers,
         )
     )  # fmt: skip

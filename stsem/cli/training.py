@@ -22,7 +22,7 @@ from stsem.train.dataset import Pairs
 from stsem.train.job import Job, Stage, stages_of
 from stsem.train.machine import machine
 from stsem.train.publish import load_checkpoint, publish
-from stsem.train.recipe import Recipe, find_recipe
+from stsem.train.recipe import Recipe, find_recipe, with_assignments
 from stsem.train.sources import Reading, Source, classes_of, join, open_source
 from stsem.train.stages import train_stage
 from stsem.train.starts import given_weights
@@ -52,6 +52,7 @@ class Wanted:
     batch: int | None
     rate: float | None
     crop: str | None
+    assignments: tuple[str, ...]
     seed: int
     device: str
     precision: str
@@ -129,7 +130,7 @@ def _recipe(wanted: Wanted) -> Recipe:
         recipe = replace(recipe, rate=wanted.rate, fused_rate=wanted.rate * recipe.fused_rate / recipe.rate)
     if wanted.crop is not None:
         recipe = replace(recipe, crop=_size(wanted.crop, "--crop"))
-    return recipe
+    return with_assignments(recipe, wanted.assignments)
 
 
 def _size(text: str, flag: str) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 import difflib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -139,6 +139,21 @@ def find_recipe(name: str) -> Recipe:
     if base not in RECIPES:
         raise UsageError(f"The recipe {name} has base = {base!r}; write base = {' or '.join(map(repr, RECIPES))}.")
     return replace(RECIPES[base], **{"name": Path(name).stem} | {key: _value(name, key, table[key]) for key in table})
+
+
+def with_assignments(recipe: Recipe, assignments: Sequence[str]) -> Recipe:
+    """A recipe changed by `KEY=VALUE`, values as in TOML: `scales=[1, 1.7]`.
+
+    Raises:
+        UsageError: one is no assignment, or a key or value cannot be.
+    """
+    table: dict[str, Any] = {}
+    for text in assignments:
+        try:
+            table |= tomllib.loads(text)
+        except tomllib.TOMLDecodeError as err:
+            raise UsageError(f"--set takes KEY=VALUE with a value as in TOML, but {text!r} came.") from err
+    return replace(recipe, **{key: _value("of the command line", key, value) for key, value in table.items()})
 
 
 def _value(where: str, key: str, value: Any) -> Any:

@@ -14,7 +14,7 @@ from stsem.train.checkpoint import averaged_weights, read_checkpoint
 from stsem.train.dataset import PairFolder
 from stsem.train.job import Job, stages_of
 from stsem.train.loop import Training
-from stsem.train.recipe import RECIPES, Recipe, find_recipe
+from stsem.train.recipe import RECIPES, Recipe, find_recipe, with_assignments
 from stsem.train.stages import train_stage
 from stsem.train.starts import begin
 
@@ -196,3 +196,13 @@ def test_a_recipe_in_a_file(tmp_path: Path) -> None:
     for name in ("best", str(tmp_path / "none.toml")):
         with pytest.raises(UsageError):
             find_recipe(name)
+
+
+def test_assignments() -> None:
+    """Values as in TOML."""
+    scratch = RECIPES["scratch"]
+    changed = with_assignments(scratch, ["scales=[1, 1.7]", "warm_up = 50", 'optimiser="sgd"'])
+    assert changed == replace(scratch, scales=(1.0, 1.7), warm_up=50, optimiser="sgd")
+    for text, sentence in (("warm_up", "KEY=VALUE"), ("warmup=5", "valid are warm_up"), ("batch=1.5", "like 8")):
+        with pytest.raises(UsageError, match=sentence):
+            with_assignments(scratch, [text])
