@@ -84,8 +84,10 @@ def test_wrong_usage(arguments: list[str], words: str, capsys: pytest.CaptureFix
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.torch
 def test_bad_input_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A data set that is not at hand, and one whose log is not there."""
+    pytest.importorskip("torch", reason="the extra 'train' is not installed")
     assert main(["table1", "--data", "kitti"]) == 1
     assert main(["table1", "--data", f"camvid={tmp_path / 'no.mcap'}", "--out", str(tmp_path)]) == 1
     first, second = capsys.readouterr().err.splitlines()
