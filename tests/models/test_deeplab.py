@@ -1,5 +1,4 @@
-"""DeepLab v2: published counts, where its classifiers look, the largest of three scales, the CRF behind it."""
-
+"""DeepLab v2: its count by hand, where its classifiers look, the largest of three scales, the CRF behind it."""
 
 import pytest
 
@@ -17,8 +16,8 @@ RESNET_101, ITS_CLASSIFIER = 44_549_160, 2048 * 1000 + 1000
 
 
 @pytest.mark.parametrize("crf", [False, True])
-def test_deeplab_has_the_published_size(crf: bool) -> None:
-    """21 classes: 44.0 M, which is ResNet-101 without its classifier and four 3x3 classifiers with biases."""
+def test_deeplab_is_a_resnet101_and_four_classifiers(crf: bool) -> None:
+    """44.0 M for 21 classes, by arithmetic: torchvision's count without its classifier, and 3x3 ones with biases."""
     with torch.device("meta"):
         found = cost_of(DeepLab(21, crf=crf), 65)
     classifiers = 4 * (2048 * 9 * 21 + 21)
