@@ -11,12 +11,14 @@ from stsem.cli.launch import verb
 
 if TYPE_CHECKING:
     from stsem.errors import StsemError
+    from stsem.inference.network import Network
     from stsem.log.log import ScannedLog
 
 HELP = """Say what is in a log, what would be used as what, what looks wrong, and what to do about it.
 
     stsem inspect log.mcap
     stsem inspect log.mcap --topic color=/front/image --json
+    stsem inspect log.mcap --model my-network.onnx
 
 Findings do not change the exit code: 0, 3 when the log is damaged, 1 when there is no clear choice, 5 when no image can be decoded.
 """  # noqa: E501  typer breaks the lines of a paragraph itself
@@ -35,13 +37,16 @@ def inspect(
     depth_registered: Annotated[
         str, typer.Option("--depth-registered", metavar="yes|no|auto", help="Are depth's pixels those of color?")
     ] = "auto",
+    model: Annotated[
+        str | None, typer.Option("--model", metavar="NAME|ONNX", help="Also say what this network would be given.")
+    ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> int:
     """Read the log once, and a sample of its frames."""
     from stsem.cli.console import progress
     from stsem.cli.foreign import pointing_to_convert
     from stsem.cli.recordings import check_once
-    from stsem.cli.tables import inspection_text, terminal_width
+    from stsem.cli.tables import inspection_text, network_line, terminal_width
     from stsem.document.canonical import canonical
     from stsem.errors import EXIT_FINE, EXIT_LOSSY, ClassTableError, LogError
     from stsem.log.describe import log_name
@@ -50,6 +55,7 @@ def inspect(
     from stsem.replay.settings import parse_topics
 
     check_once(log)
+    network = None if model is None else _network(model)
     topics = parse_topics(topic or [])
     with progress(f"Reading {log_name(log)}") as step, pointing_to_convert(log):
         scanned = scan_log(log, step)
@@ -61,11 +67,19 @@ def inspect(
     with opened:
         found = inspect_log(opened)
     if json_:
-        print(canonical(found.as_dict()).decode(), end="")
+        given = {} if network is None else {"network": {"name": network.name, "inputs": network.sidecar.inputs}}
+        print(canonical({**found.as_dict(), **given}).decode(), end="")
     else:
-        command = _command(log, topic or [], classes, depth_registered)
-        print(inspection_text(found, command, terminal_width()), end="")
+        command = _command(log, topic or [], classes, depth_registered, model)
+        said = None if network is None else network_line(network.name, network.sidecar.inputs, found)
+        print(inspection_text(found, command, terminal_width(), said), end="")
     return EXIT_LOSSY if opened.info.damage.lossy else EXIT_FINE
+
+
+def _network(model: str) -> "Network":
+    from stsem.inference.network import load_network  # and with it ONNX Runtime, which nothing else here needs
+
+    return load_network(model)
 
 
 def _print_unopened(scanned: "ScannedLog", error: "StsemError", *, as_json: bool) -> None:
@@ -86,7 +100,9 @@ def _print_unopened(scanned: "ScannedLog", error: "StsemError", *, as_json: bool
     print(canonical(known).decode(), end="")
 
 
-def _command(log: Sequence[str], topics: Sequence[str], classes: Path | None, depth_registered: str) -> str:
+def _command(
+    log: Sequence[str], topics: Sequence[str], classes: Path | None, depth_registered: str, model: str | None
+) -> str:
     """The replay of what was inspected, as typed in a shell."""
     from stsem.log.container.source import without_secrets
 
@@ -94,4 +110,5 @@ def _command(log: Sequence[str], topics: Sequence[str], classes: Path | None, de
     words += [word for topic in topics for word in ("--topic", topic)]
     words += ["--classes", str(classes)] if classes else []
     words += ["--depth-registered", depth_registered] if depth_registered != "auto" else []
+    words += ["--model", model] if model else []
     return shlex.join(words)

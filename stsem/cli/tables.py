@@ -22,12 +22,24 @@ def terminal_width() -> int:
     return max(MIN_WIDTH, shutil.get_terminal_size((WIDTH_WITHOUT_TERMINAL, 0)).columns)
 
 
-def inspection_text(found: Inspection, command: str, width: int) -> str:
-    """Everything that was found, in lines of `width` where that goes; `command` replays the log as it was inspected."""
+def inspection_text(found: Inspection, command: str, width: int, network: str | None = None) -> str:
+    """Everything that was found, in lines of `width` where that goes; `command` replays the log as it was inspected,
+    `network` is what there is to say of a network that was asked about."""
     return _joined([
         _head(found, width), channel_table(found.channels, width), _used(found), _facts(found, width), _truth(found),
-        _findings(found, width), _verdict(found, command),
+        _findings(found, width), "\n".join(_wrapped("Network: ", [network] if network else [], width)),
+        _verdict(found, command),
     ])  # fmt: skip
+
+
+def network_line(name: str, inputs: Sequence[str], found: Inspection) -> str:
+    """What the network `name` with `inputs` would be given of this log."""
+    said, frames = f"{name} would be given {', '.join(inputs)}", found.frames
+    if "depth" not in inputs or (lacking := frames.count - frames.with_depth) == 0:
+        return said
+    if found.depth is None:
+        return f"{said}, but the log has no depth that can be used: a replay with it is refused"
+    return f"{said}; {lacking} of {frames.count} frames have no depth, and are given it as unknown all over"
 
 
 def unopened_text(channels: Sequence[ChannelInfo], damage: Damage, error: StsemError, width: int) -> str:

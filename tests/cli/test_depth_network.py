@@ -1,5 +1,7 @@
 """A network that takes depth, replayed: what reaches it, what waits for it, what is said where there is none."""
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -101,3 +103,22 @@ def test_costs_are_measured_with_depth(cli: Cli, network: Path, tiny_log: Path) 
     ran = cli("costs", "measure", tiny_log, "--out", "costs.json", "--model", network, "--samples", 1, "--seconds", 0.1)
     assert ran.code == 0
     assert "segment@2" in ran.out
+
+
+@pytest.mark.parametrize(("depth", "said"), [
+    (lambda i: True, "net would be given image, depth\n"),
+    (lambda i: i != 3, "net would be given image, depth; 1 of 6 frames have no depth"),
+    (None, "net would be given image, depth, but the log has no depth that can be used: a replay with it is refused"),
+])  # fmt: skip
+def test_inspect_says_what_the_network_would_be_given(
+    cli: Cli, network: Path, tmp_path: Path, depth: Callable[[int], bool] | None, said: str
+) -> None:
+    """In the text, the JSON, and the command to replay."""
+    log = write_walk(tmp_path / "log.mcap", frames=6, depth=depth)
+    ran = cli("inspect", log, "--model", "net.onnx")
+    assert ran.code == 0
+    assert f"Network: {said}" in ran.out
+    assert ran.out.strip().endswith("--model net.onnx")
+    given = json.loads(cli("inspect", log, "--model", "net.onnx", "--json").out)["network"]
+    assert given == {"name": "net", "inputs": ["image", "depth"]}
+    assert "Network:" not in cli("inspect", log).out
