@@ -93,7 +93,7 @@ def train(
         Wanted(
             data=tuple(data), validation=tuple(validation or ()), out=out, architecture=architecture, weights=weights,
             size=size, classes=classes, class_map=class_map, topics=tuple(topic or ()), recipe=recipe, stages=stages,
-            iterations=iterations, batch=batch, rate=rate, crop=crop, assignments=tuple(set_ or ()), seed=seed, device=device, precision=precision,
-            workers=workers,
+            iterations=iterations, batch=batch, rate=rate, crop=crop, assignments=tuple(set_ or ()), seed=seed,
+            device=device, precision=precision, workers=workers,
         )
     )  # fmt: skip

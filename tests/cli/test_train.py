@@ -15,6 +15,8 @@ pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 
 from stsem.cli import training
 from stsem.train.job import Job
+from stsem.train.machine import DEVICES, PRECISIONS
+from stsem.train.recipe import RECIPES
 from stsem.train.stages import train_stage
 from tests.train.squares import SCRATCH, SIDECAR, short, write_squares
 
@@ -92,6 +94,16 @@ def test_from_given_weights(cli: Cli, home: Path) -> None:
     assert without.code == 1
     assert "of another training (its starts differ)" in without.err
     assert "The recipe paper presumes weights that were trained elsewhere" in without.err
+
+
+def test_help_names_every_choice(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside its option; and the architecture and recipe that are taken without one."""
+    monkeypatch.setenv("COLUMNS", "300")
+    monkeypatch.setenv("NO_COLOR", "1")
+    lines = cli("train", "--help").out.splitlines()
+    for option, choices in (("--recipe", RECIPES), ("--device", DEVICES), ("--precision", PRECISIONS)):
+        (line,) = (line for line in lines if re.match(rf"\W*{option}(?!\S)", line))
+        assert all(re.search(rf"\b{choice}\b", line) for choice in choices)
 
 
 @pytest.mark.parametrize(("arguments", "code", "sentence"), [

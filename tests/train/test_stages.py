@@ -1,6 +1,6 @@
 """Colour, then difference, then both: what each stage begins with, for each recipe."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -168,6 +168,28 @@ def test_the_papers_numbers() -> None:
     assert paper.rate_at(10_000) == pytest.approx(2.5e-4 * 0.5**0.9)
     assert paper.fused().rate_at(0) == 1e-4
     assert RECIPES["scratch"].rate_at(0) == pytest.approx(2e-3 / 200)
+
+
+def test_the_document_states_the_recipes() -> None:
+    """Every number of docs/train.md is the one that is used, and none is left out."""
+    text = (Path(__file__).parents[2] / "docs" / "train.md").read_text(encoding="utf-8")
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("| ")
+    ]
+    stated = {row[0]: row[1:] for row in rows[rows.index(["number", "`paper`", "`scratch`"]) + 1 :]}
+    apart = {"name", "pretrained", "checkpoint_every", "report_every", "validate_every"}
+    assert stated == {
+        key: [_in_words(getattr(recipe, key)) for recipe in (RECIPES["paper"], RECIPES["scratch"])]
+        for key in (field.name for field in fields(Recipe)) if key not in apart
+    }  # fmt: skip
+
+
+def _in_words(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, tuple):
+        return ("x" if isinstance(value[0], int) else " to ").join(f"{part:g}" for part in value)
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 
 @pytest.mark.parametrize(("text", "sentence"), [
