@@ -4,6 +4,7 @@ from stsem.document.calibration import Calibration, ErrorDetection
 from stsem.document.schema import Document, Run
 from stsem.report.outline import Block, Column, Figure, Row, Section, Table, Text
 from stsem.report.wording import MEASURES, NOT_MEASURED, count, meaning, number, percent
+from stsem.uncertainty import DOUBT
 
 _PARTS = {"segmented": "segmented", "propagated": "propagated", "delivered": "all"}
 
@@ -69,10 +70,8 @@ def _detection(found: list[tuple[Run, ErrorDetection]]) -> Table:
     wrong = Row(("wrong pixels, %", *(percent(detection.wrong_share) for _, detection in found)))
     frames = Row(("n, frames", *(count(detection.n) for _, detection in found)))
     judged = ", ".join(dict.fromkeys(detection.judged for _, detection in found))
-    notes = (
-        meaning(ErrorDetection, "auc"),
-        f"Pass: {judged}. Only frames that the network segmented: propagated ones have no maps of their own.",
-    )
+    maps = ": propagated ones have no maps of their own" if set(shown) - {DOUBT} else ""
+    notes = (meaning(ErrorDetection, "auc"), f"Pass: {judged}. Only frames that the network segmented{maps}.")
     return Table(columns, (*rows, wrong, frames), notes)
 
 
