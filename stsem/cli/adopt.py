@@ -55,10 +55,12 @@ def adopt(
         network, out, told, size=form.size, classes=len(form.classes), metadata={CLASS_COUNT: str(len(form.classes))},
         inputs={role: CHANNELS[role] for role in form.inputs},
     )  # fmt: skip
-    try:
-        out.with_suffix(".toml").write_text(render(form), encoding="utf-8")
-    except OSError as err:
-        raise OutputError(f"The sidecar of {out} cannot be written: {err.strerror}.") from err
+    beside = out.with_suffix(".toml")
+    if beside.resolve() != sidecar.resolve():  # else the user's own, with comments
+        try:
+            beside.write_text(render(form), encoding="utf-8")
+        except OSError as err:
+            raise OutputError(f"The sidecar {beside} cannot be written: {err.strerror}.") from err
     load_network(out)
     print("Found:   " + "\n         ".join(found))
     width, height = form.size
