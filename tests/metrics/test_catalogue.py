@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 
 from stsem.document.accuracy import Consistency, Coverage, DistanceRow, DistanceSummary, Loss, Score
+from stsem.document.calibration import Calibration, ErrorDetection, ReliabilityBin
 from stsem.document.part import Part
 from stsem.document.schema import MapScore, TrajectoryScore
 from stsem.document.timing import Distribution, Latency, Outcomes, Throughput
@@ -20,6 +21,9 @@ def test_every_number_has_unit_and_direction() -> None:
     assert facts("outcomes.propagated").higher_is_better is None
     assert facts("throughput.output_hz").unit == "Hz"
     assert facts("trajectory.ate_rmse_m").higher_is_better is False
+    assert facts("calibration.segmented.ece").higher_is_better is False
+    assert facts("calibration.delivered.confidence").higher_is_better is None
+    assert facts("error_detection.auc.entropy").higher_is_better
     with pytest.raises(ValueError, match="no number of a run is called 'vibes'"):
         facts("vibes")
     assert len({pattern for pattern, _ in CATALOGUE}) == len(CATALOGUE)
@@ -28,7 +32,7 @@ def test_every_number_has_unit_and_direction() -> None:
 @pytest.mark.parametrize(
     "part",
     [Score, Loss, DistanceRow, DistanceSummary, Coverage, Consistency, Distribution, Latency, Throughput, Outcomes,
-     TrajectoryScore, MapScore],
+     TrajectoryScore, MapScore, Calibration, ErrorDetection, ReliabilityBin],
 )  # fmt: skip
 def test_every_number_of_the_report_is_defined(part: type[Part]) -> None:
     """docs/metrics.md names every key of the report's numbers."""
