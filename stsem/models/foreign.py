@@ -72,10 +72,13 @@ def read_foreign(path: Path) -> onnx.ModelProto:
     if opset < OLDEST_OPSET:
         try:
             model = version_converter.convert_version(model, OLDEST_OPSET)
-        except (RuntimeError, ValueError, IndexError) as err:
+        except (version_converter.ConvertError, RuntimeError, ValueError, IndexError) as err:
             raise NetworkError(f"The network {path} is of opset {opset}, which onnx cannot convert to {OLDEST_OPSET}; "
                                f"export it again with opset {OLDEST_OPSET} or later.") from err  # fmt: skip
-    return compose.add_prefix(model, PREFIX)
+    try:
+        return compose.add_prefix(model, PREFIX)
+    except TypeError as err:  # a name that is not UTF-8 comes as bytes
+        raise NetworkError(f"The network {path} is damaged; export it to ONNX again.") from err
 
 
 def shown(name: str) -> str:
@@ -166,7 +169,9 @@ def find_output(model: onnx.ModelProto, inputs: Sequence[ForeignInput], name: st
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 3
     try:
-        session = onnxruntime.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
+        session = onnxruntime.InferenceSession(
+            model.SerializeToString(), options, providers=["CPUExecutionProvider"], enable_fallback=0
+        )
         (value,) = session.run([chosen], feed)
     except _ORT_FAILURES as err:
         raise NetworkError(f"The network fails on an image of the sidecar's size: {str(err).splitlines()[0]}") from err

@@ -90,8 +90,8 @@ def _reason(path: Path, head: bytes, err: BaseException) -> str:
     for is_it, what in _FOREIGN:
         if is_it(path, head):
             return f"it is {what}; {_SAVE}"
-    if zipfile.is_zipfile(path):
-        names = _zipped(path)
+    names = _zipped(path)
+    if names:
         if not any(name.endswith("data.pkl") for name in names):
             return f"it is a zip archive without weights; {_SAVE}"
         if any(name.endswith("constants.pkl") for name in names):
@@ -106,6 +106,7 @@ _CALLED = re.compile(r"(?:GLOBAL|global|instantiate|class) [`']?([\w.]+\.\w+)")
 
 
 def _zipped(path: Path) -> list[str]:
+    """Names in a zip archive; none where it is no whole one."""
     try:
         with zipfile.ZipFile(path) as archive:
             return archive.namelist()

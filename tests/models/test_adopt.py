@@ -226,11 +226,13 @@ def test_what_cannot_be_adopted(tmp_path: Path, case: str) -> None:
 
 
 @pytest.mark.parametrize("spoil", [lambda p: p.write_bytes(b""), lambda p: p.write_text("text"), Path.unlink,
-                                   lambda p: p.write_bytes(p.read_bytes()[:99])])  # fmt: skip
+                                   lambda p: p.write_bytes(p.read_bytes()[:99]),
+                                   lambda p: p.write_bytes(p.read_bytes().replace(b"Conv", b"\xffonv")),
+                                   lambda p: p.write_bytes(p.read_bytes().replace(b"image", b"im\xffge"))])  # fmt: skip
 def test_files_that_are_no_networks(tmp_path: Path, spoil: Callable[[Path], object]) -> None:
     path = foreign(tmp_path / "net.onnx")
     spoil(path)
-    with pytest.raises(NetworkError, match=r"no ONNX file|cannot be read|fails on"):
+    with pytest.raises(NetworkError, match=r"no ONNX file|cannot be read|fails on|damaged"):
         adopted(path)
 
 

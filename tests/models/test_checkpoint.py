@@ -250,6 +250,14 @@ def _zip(path: Path) -> None:
         archive.writestr("a.txt", "x")
 
 
+def _many_disks(path: Path) -> None:
+    """zipfile itself raises an error of its own here."""
+    _zip(path)
+    end, locator = path.read_bytes(), b"PK\x06\x07" + bytes(4 + 8) + b"\x02\x00\x00\x00"
+    at = end.index(b"PK\x05\x06")
+    path.write_bytes(end[:at] + locator + end[at:])
+
+
 def _script(path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -274,6 +282,7 @@ FILES: dict[str, tuple[str, Callable[[Path], object], str]] = {
     "list": ("a.pth", _torch([torch.zeros(2)]), "holds no weights by name, but a list"),
     "nothing": ("a.pth", _torch({}), "an empty table"),
     "numbers": ("a.pth", _torch({"epoch": 3, "state_dict": {"a": 1}}), "the keys 'epoch', 'state_dict'"),
+    "zip of many disks": ("a.pth", _many_disks, "it is damaged"),
     "zip": ("a.pth", _zip, "it is a zip archive without weights"),
     "program": ("a.pt", _script, "it is a TorchScript program"),
     "onnx": ("a.onnx", _bytes(b"\x08\x08\x12\x07pytorch"), "an ONNX network"),
