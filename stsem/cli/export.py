@@ -27,7 +27,7 @@ def export(
     ] = None,
     sidecar: Annotated[
         Path | None,
-        typer.Option("--sidecar", metavar="TOML", help="Size, normalisation, classes and difference to export with."),
+        typer.Option("--sidecar", metavar="TOML", help="Size, normalisation, classes, how difference and depth are formed."),
     ] = None,
     checkpoint: Annotated[Path | None, typer.Option("--checkpoint", help="Weights and architecture.")] = None,
     architecture: Annotated[
@@ -72,6 +72,7 @@ def export(
     published = publish(network, described, out, passes=passes)
     width, height = published.size
     print(f"Network: {out} ({out.stat().st_size / 1e6:.1f} MB, {classes} classes, {width}x{height})")
+    print(f"Inputs:  {', '.join(published.sidecar.inputs)}")
     print(f"Replay:  stsem-replay LOG --model {out}")
     return 0
 

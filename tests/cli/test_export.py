@@ -1,5 +1,6 @@
 """`stsem export`, as typed."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from stsem.classes import ClassSet
 from stsem.frame import Frame
 from stsem.inference.inferencer import Inferencer
 from stsem.inference.network import load_network
-from stsem.inference.sidecar import Difference, Sidecar, render
+from stsem.inference.sidecar import DepthForm, Difference, Sidecar, render
 from stsem.models.zoo import ZOO, build
 
 from .conftest import Cli
@@ -41,6 +42,22 @@ def test_a_network_with_uncertainty(cli: Cli, sidecar: Path, tmp_path: Path) -> 
     outputs = onnxruntime.InferenceSession(str(out), providers=["CPUExecutionProvider"]).get_outputs()
     assert [port.name for port in outputs] == ["labels", "confidence", "variance", "entropy", "mutual_information"]
     assert all(port.shape == [1, 41, 89] for port in outputs)
+
+
+def test_the_sidecar_follows_the_inputs(cli: Cli, sidecar: Path, tmp_path: Path) -> None:
+    """A network with depth and without difference, from a sidecar that has it the other way round; nothing is said but
+    what was done. How a difference was scaled nobody can guess."""
+    out = tmp_path / "net.onnx"
+    ran = cli("export", out, "--sidecar", sidecar, "--architecture", "fusenet-w1")
+    assert (ran.code, ran.err) == (0, "")
+    assert "Inputs:  image, depth\n" in ran.out
+    network = load_network(out)
+    assert network.sidecar == replace(SIDECAR, difference=None, depth=DepthForm())
+    sidecar.write_text(render(network.sidecar), encoding="utf-8")
+    ran = cli("export", tmp_path / "other.onnx", "--sidecar", sidecar, "--architecture", "pspnet-r18-sum-w1")
+    assert ran.code == 1
+    assert "its sidecar has no section [difference]" in ran.sentence
+    assert not (tmp_path / "other.onnx").exists()
 
 
 def test_weights_from_elsewhere(cli: Cli, sidecar: Path, tmp_path: Path) -> None:
