@@ -27,7 +27,7 @@ def export(
     ] = None,
     sidecar: Annotated[
         Path | None,
-        typer.Option("--sidecar", metavar="TOML", help="Size, normalisation, classes, how difference and depth are formed."),
+        typer.Option("--sidecar", metavar="TOML", help="Size, normalisation, classes, forms of difference and depth."),
     ] = None,
     checkpoint: Annotated[Path | None, typer.Option("--checkpoint", help="Weights and architecture.")] = None,
     architecture: Annotated[
