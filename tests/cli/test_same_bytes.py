@@ -101,9 +101,9 @@ def test_repeat_never_reads_the_cache(replay: Cli, home: Path, tiny_log: Path, m
 
     honest, calls = Inferencer.compute, []
 
-    def moody(self: Inferencer, image: Any, previous: Any) -> Output:
+    def moody(self: Inferencer, frame: Any) -> Output:
         calls.append(1)
-        answer = honest(self, image, previous)
+        answer = honest(self, frame)
         if len(calls) != 3:
             return answer
         return Output(np.full_like(answer.labels, 2 if (answer.labels == 0).any() else 0), answer.confidence)
