@@ -86,7 +86,8 @@ def train(
     from stsem.errors import MissingExtraError
 
     try:
-        from stsem.cli.training import Wanted, train_all
+        from stsem.cli.training import train_all
+        from stsem.cli.training_plan import Wanted
     except ModuleNotFoundError as err:
         raise MissingExtraError("train", "Training a network") from err
     return train_all(

@@ -10,6 +10,7 @@ from stsem.classes import ClassSet
 from stsem.cli.console import note, progress
 from stsem.cli.recordings import check_once, recordings
 from stsem.cli.stagebar import drawn, shown, stopping_in_order
+from stsem.cli.training_plan import Wanted, chosen_recipe, chosen_stages, parse_size
 from stsem.errors import TrainingStoppedError, UsageError
 from stsem.inference.network import Network
 from stsem.inference.sidecar import Difference, Sidecar
@@ -19,10 +20,10 @@ from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
 from stsem.replay.settings import parse_topics
 from stsem.train.dataset import Pairs
-from stsem.train.job import Job, Stage, stages_of
+from stsem.train.job import Job, Stage
 from stsem.train.machine import machine
 from stsem.train.publish import load_checkpoint, publish
-from stsem.train.recipe import Recipe, find_recipe, with_assignments
+from stsem.train.recipe import Recipe
 from stsem.train.sources import Reading, Source, classes_of, join, open_source
 from stsem.train.stages import train_stage
 from stsem.train.starts import given_weights
@@ -31,32 +32,6 @@ from stsem.train.vocabulary import read_class_map
 MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Of ImageNet's images, RGB in 0..1: what weights from elsewhere expect."""
 DIFFERENCE_SCALE = 4.0
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """The flags of `stsem train`, as typed."""
-
-    data: tuple[str, ...]
-    validation: tuple[str, ...]
-    out: Path
-    architecture: str
-    weights: Path | None
-    size: str | None
-    classes: Path | None
-    class_map: Path | None
-    topics: tuple[str, ...]
-    recipe: str
-    stages: str | None
-    iterations: int | None
-    batch: int | None
-    rate: float | None
-    crop: str | None
-    assignments: tuple[str, ...]
-    seed: int
-    device: str
-    precision: str
-    workers: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +56,8 @@ def train_all(wanted: Wanted) -> int:
     Raises:
         StsemError: something cannot be.
     """
-    stages = _stages(wanted)
-    job = Job(wanted.architecture, "fused", _sidecar_like(wanted), _recipe(wanted), wanted.seed,
+    stages = chosen_stages(wanted)
+    job = Job(wanted.architecture, "fused", _sidecar_like(wanted), chosen_recipe(wanted), wanted.seed,
               machine=machine(wanted.device, wanted.precision, wanted.workers))  # fmt: skip
     set_threads(1)
     try:
@@ -99,50 +74,9 @@ def train_all(wanted: Wanted) -> int:
     return 0
 
 
-def _stages(wanted: Wanted) -> tuple[tuple[Stage, str], ...]:
-    """Stage and architecture, of those that were asked for."""
-    known = stages_of(wanted.architecture)
-    if wanted.stages is None:
-        return known
-    names = [name.strip() for name in wanted.stages.split(",")]
-    chosen = tuple(row for row in known if row[0] in names)
-    if len(chosen) != len(names):
-        raise UsageError(f"--stages {wanted.stages} cannot be: {wanted.architecture} has "
-                         f"{', '.join(stage for stage, _ in known)}.")  # fmt: skip
-    return chosen
-
-
-def _recipe(wanted: Wanted) -> Recipe:
-    """The recipe with what the flags say; the fused stage changes in proportion."""
-    recipe = find_recipe(wanted.recipe)
-    if wanted.iterations is not None:
-        count = wanted.iterations
-        fused = round(count * recipe.fused_iterations / recipe.iterations)
-        recipe = replace(
-            recipe, iterations=count, fused_iterations=max(1, fused),
-            report_every=min(recipe.report_every, max(1, count // 20)),
-            checkpoint_every=min(recipe.checkpoint_every, max(1, count // 10)),
-            validate_every=min(recipe.validate_every, max(1, count // 5)),
-        )  # fmt: skip
-    if wanted.batch is not None:
-        recipe = replace(recipe, batch=wanted.batch, fused_batch=wanted.batch)
-    if wanted.rate is not None:
-        recipe = replace(recipe, rate=wanted.rate, fused_rate=wanted.rate * recipe.fused_rate / recipe.rate)
-    if wanted.crop is not None:
-        recipe = replace(recipe, crop=_size(wanted.crop, "--crop"))
-    return with_assignments(recipe, wanted.assignments)
-
-
-def _size(text: str, flag: str) -> tuple[int, int]:
-    width, times, height = text.partition("x")
-    if not (times and text.isascii() and width.isdigit() and height.isdigit() and int(width) and int(height)):
-        raise UsageError(f"{flag} takes WIDTHxHEIGHT, such as 329x185, but {text!r} came.")
-    return int(width), int(height)
-
-
 def _sidecar_like(wanted: Wanted) -> Sidecar:
     """Before the data is known: one class, any size."""
-    size = (1, 1) if wanted.size is None else _size(wanted.size, "--size")
+    size = (1, 1) if wanted.size is None else parse_size(wanted.size, "--size")
     return Sidecar(size, MEAN, STD, ClassSet(("unknown",)), Difference(DIFFERENCE_SCALE))
 
 

@@ -93,8 +93,8 @@ def _run(
             training.record.validations[now] = _judged(training, job, validation, None if last else JUDGED)
         stop = stopping() and not last
         if last or stop or now % recipe.checkpoint_every == 0:
-            write_checkpoint(path, identity | training.state())
             write_csv(path.with_name(CURVES), points(training.record, recipe))
+            write_checkpoint(path, identity | training.state())
         if last or now % recipe.report_every == 0:
             report(_progress(training, job))
         if stop:
