@@ -69,8 +69,8 @@ def _sorted_area(scores: np.ndarray, wrong: np.ndarray) -> float:
 def test_the_same_bytes_twice(cli: Cli, home: Path, tiny_log: Path, made_up_costs: Path, unsure: Path) -> None:
     """Cold and from the cache, the annotated log included; pictures are drawn the first time only."""
     for name, *plots in (("cold",), ("warm", "--no-plots")):
-        ran = cli("replay", tiny_log, "--model", unsure, "--costs", made_up_costs, "--mode", "per-frame", "--end", "0.4",
-                  "--annotate", "--out", name, *plots)  # fmt: skip
+        ran = cli("replay", tiny_log, "--model", unsure, "--costs", made_up_costs, "--mode", "per-frame",
+                  "--end", "0.4", "--annotate", "--out", name, *plots)  # fmt: skip
         assert ran.code == 0, ran.err
     cold, warm = repeatable_files(home / "cold"), repeatable_files(home / "warm")
     drawn = {name for name in cold if name.startswith("plots/")}
