@@ -1,6 +1,7 @@
 """The training loop: pairs in, weights out. Any iteration can be repeated: its draws are keyed by its number."""
 
 import copy
+import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -77,7 +78,7 @@ class Training:
         self._optimiser.step()
         self._mean.update_parameters(self.network)
         loss = sum(losses)
-        if not torch.isfinite(torch.tensor(loss)):
+        if not math.isfinite(loss):
             raise TrainingError(f"The loss of iteration {self.iteration} is {loss}: the training diverges; "
                                 "begin anew with a smaller --rate.")  # fmt: skip
         self.iteration += 1

@@ -24,9 +24,9 @@ JOB = Job("pspnet-r18-spatial-w1", "colour", SIDECAR, RECIPE, seed=1)
 
 
 def test_killed_at_several_moments(tmp_path: Path) -> None:
-    """Before the first checkpoint, between two, and in the middle of writing one."""
+    """In the middle of writing the first checkpoint, and between two."""
     write_squares(tmp_path / "pairs")
-    for moment, left in (("step:2", None), ("save:6", 3), ("step:8", 6)):
+    for moment, left in (("save:3", None), ("step:8", 6)):
         command = [sys.executable, str(Path(__file__).with_name("killed.py"))]
         ended = subprocess.run([*command, tmp_path / "pairs", tmp_path / "killed", moment], check=False, cwd=ROOT,
                                env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True)  # fmt: skip

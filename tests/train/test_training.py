@@ -41,10 +41,10 @@ def whole(pairs: PairFolder, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_it_learns_and_what_it_publishes_works(pairs: PairFolder, tmp_path: Path) -> None:
-    """From noise to most pixels right in 40 small steps, both streams at once, through ONNX and the user's loader."""
+    """From noise to most pixels right in 40 small steps, through ONNX and the user's loader."""
     reports: list[Progress] = []
     recipe = replace(short(SCRATCH, 40), report_every=10, validate_every=100)
-    job = Job("pspnet-r18-w2-w1", "fused", SIDECAR, recipe)
+    job = Job("pspnet-r18-spatial-w2", "colour", SIDECAR, recipe)
     checkpoint = train_stage(job, pairs, pairs, tmp_path / "stage", reports.append)
     assert [r.iteration for r in reports] == [10, 20, 30, 40]
     assert reports[-1].loss < 0.6 * reports[0].loss
@@ -53,7 +53,7 @@ def test_it_learns_and_what_it_publishes_works(pairs: PairFolder, tmp_path: Path
     scores = judge(network, SIDECAR, pairs).compute()
     assert reports[-1].validation == (scores.miou, scores.pixel_accuracy)
     test = pair(99)
-    published = publish(network, SIDECAR, tmp_path / "net.onnx")
+    published = publish(network, SIDECAR.for_inputs(network.inputs), tmp_path / "net.onnx")
     answer = Inferencer(published, threads=1).infer(Frame(1, 1, test.images[1], previous=test.images[0]))
     assert (answer.labels == test.labels[1]).mean() > 0.8
 
@@ -128,6 +128,16 @@ def test_other_pairs_and_broken_checkpoints_are_refused(whole: Path, tmp_path: P
         read_checkpoint(tmp_path / "plain.pt")
     with pytest.raises(NetworkError, match="5 classes"):
         load_checkpoint(whole, 5)
+
+
+def test_a_checkpoint_of_an_earlier_version_can_be_published(whole: Path, tmp_path: Path) -> None:
+    """Architecture and averaged weights are all that it needs; it is not gone on with."""
+    path = tmp_path / "checkpoint.pt"
+    write_checkpoint(path, {"architecture": SPATIAL.architecture, "mean": read_checkpoint(whole)["mean"]})
+    old, new = (load_checkpoint(given, 3).state_dict() for given in (path, whole))
+    assert all(torch.equal(old[name], new[name]) for name in new)
+    with pytest.raises(TrainingError, match="of another training"):
+        train_stage(SPATIAL, write_squares(tmp_path / "pairs", 2), None, tmp_path, lambda _: None)
 
 
 def test_a_full_disk_keeps_the_checkpoint_before(whole: Path, tmp_path: Path) -> None:
