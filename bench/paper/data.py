@@ -115,7 +115,7 @@ def find_data(given: str, out: Path, offices: Path) -> Data:
 _NOWHERE = Path()
 _DATA = {
     "offices": Data(
-        "offices", _NOWHERE, None, OFFICE, (233, 137), ("floor", "lamp"), Place(0, 0), (1200, 400), depth=True
+        "offices", _NOWHERE, None, OFFICE, (233, 137), ("floor", "lamp"), Place(0, 0), (800, 250), depth=True
     ),
     "camvid": Data("camvid", _NOWHERE, None, recorded.CAMVID, (185, 137), ("Road", "Pole"), Place(1, 1), (300, 100)),
     "cityscapes": Data(
