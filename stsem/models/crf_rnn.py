@@ -41,9 +41,16 @@ class CRFRNN(FCN):
         width: factor on FCN-8s's channels.
     """
 
+    side_rule = "4 k + 1"
+
     def __init__(self, classes: int, width: float = 1.0) -> None:
         super().__init__(classes, width, stride=8)
         self.crf = MeanField(classes)
+
+    def nearest_side(self, side: int) -> int:
+        """4 k + 1, so that cells are pixels of the image: the field widens what little two libraries differ in when
+        they resample, to 3e-4 of a probability."""
+        return max(1, round((side - 1) / SHRINK)) * SHRINK + 1
 
     def features(self, *inputs: Tensor) -> tuple[Tensor, ...]:
         """Image (B, 3, H, W) -> FCN-8s's features, and the affinities of the field's cells."""

@@ -60,9 +60,7 @@ def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passe
     found = _agreement_on_noise(network, published, passes)
     if not found.holds:
         raise NetworkError(
-            f"The exported network {path} gives {found.labels:.4%} of the labels that torch gives, and its confidence "
-            f"is off by up to {found.largest:.1e}; {Agreement.SHARE:.2%} and {Agreement.DIFFERENCE:.0e} are needed. "
-            "Do not use it."
+            f"The exported network {path} does not answer as torch does: equal are {found}; do not use it."
         )
     return published
 

@@ -71,8 +71,8 @@ def test_five_frames(
 
 @pytest.mark.parametrize("name", ZOO)
 def test_the_exported_graph_answers_as_torch(name: str, exported: Callable[[str], Exported], log: Path) -> None:
-    """Labels on 99.99 % of the pixels, confidence and maps to 1e-4, on a frame of the log with its depth; labels come
-    back at the image's size. Probabilities are no constant."""
+    """Labels on 99.99 % of the pixels, confidence to 1e-4, maps to 1e-3, on a frame of the log with its depth; labels
+    come back at the image's size. Probabilities are no constant."""
     made = exported(name)
     with open_log([log]) as opened:
         frame = opened.frame(2, depth=True, previous=True)
@@ -83,7 +83,7 @@ def test_the_exported_graph_answers_as_torch(name: str, exported: Callable[[str]
     session = onnxruntime.InferenceSession(str(made.published.path), providers=["CPUExecutionProvider"])
     (confidence,) = session.run(["confidence"], inputs)
     assert confidence.shape == (1, *made.published.size[::-1])
-    assert confidence.std() > 1e-5
+    assert np.unique(confidence).size > 100
     assert confidence.min() >= 1 / len(CLASSES) - 1e-6
     answer = Inferencer(made.published, threads=1).infer(frame)
     assert answer.labels.shape == SIZE[::-1]
