@@ -49,14 +49,15 @@ def export(
     """Exactly one of checkpoint and architecture, or the list alone."""
     from stsem.errors import MissingExtraError, UsageError
 
+    if show:
+        from stsem.models.sizes import table
+
+        print(table())
+        return 0
     try:
-        from stsem.models.cost import table
         from stsem.train.publish import load_checkpoint, publish
     except ModuleNotFoundError as err:
         raise MissingExtraError("train", "Exporting a network") from err
-    if show:
-        print(table())
-        return 0
     if out is None or sidecar is None or (checkpoint is None) == (architecture is None):
         raise UsageError("stsem export takes OUT.onnx, --sidecar, and either --checkpoint or --architecture.")
     if weights is not None and architecture is None:

@@ -1,17 +1,14 @@
-"""What a network costs: counted, not typed."""
+"""What a network costs: counted, not typed. Run as a program, it writes sizes.csv again."""
 
 from dataclasses import dataclass
 from functools import cache
 
 import torch
-from tabulate import tabulate
 from torch.utils.flop_counter import FlopCounterMode
 
 from stsem.models.network import CHANNELS, SegmentationNetwork
+from stsem.models.sizes import CLASSES, KEPT, SIDE, Size, written
 from stsem.models.zoo import ZOO, build
-
-SIDE = 473
-"""Pixels a side, the paper's figure for PSPNet on ResNet-50; 48 k - 7."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +44,14 @@ def cost(name: str, classes: int, side: int = SIDE) -> Cost:
         return cost_of(build(name, classes), side)
 
 
-def table(classes: int = 13) -> str:
-    """Every network of the zoo, at its paper's width, as a table in Markdown."""
-    rows = []
-    for name, row in ZOO.items():
-        found = cost(name, classes)
-        paper = f"{row.paper.authors}, {row.paper.title}, {row.paper.figure}"
-        rows.append((name, f"{found.parameters / 1e6:.1f}", f"{found.auxiliary / 1e6:.1f}",
-                     f"{found.multiply_adds / 1e9:.0f}", paper))  # fmt: skip
-    heads = ("name", "M parameters", "M auxiliary", f"G multiply-adds at {SIDE}", "paper")
-    return tabulate(rows, heads, tablefmt="pipe", disable_numparse=True, colalign=("left", *["right"] * 3, "left"))
+def counted(name: str) -> Size:
+    """The row of sizes.csv for a network of the zoo."""
+    paper = ZOO[name].paper
+    found = cost(name, CLASSES)
+    return Size(
+        name, found.parameters, found.auxiliary, found.multiply_adds, f"{paper.authors}, {paper.title}, {paper.figure}"
+    )
+
+
+if __name__ == "__main__":
+    KEPT.write_text(written(map(counted, ZOO)), encoding="utf-8")

@@ -8,8 +8,9 @@ import pytest
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
 from stsem.errors import UsageError
-from stsem.models.cost import table
+from stsem.models.cost import counted
 from stsem.models.names import FAMILIES
+from stsem.models.sizes import kept, table
 from stsem.models.zoo import ZOO, find
 
 pytestmark = pytest.mark.torch
@@ -17,7 +18,9 @@ DOCUMENT = (Path(__file__).parents[2] / "docs" / "networks.md").read_text(encodi
 
 
 def test_the_table_is_counted() -> None:
-    """Names, weights, multiply-adds and papers; made again by `stsem export --list`."""
+    """Names, weights, multiply-adds and papers; `python -m stsem.models.cost` writes them again, and
+    `stsem export --list` prints the document's table."""
+    assert kept() == tuple(map(counted, ZOO))
     assert table() in DOCUMENT
 
 
