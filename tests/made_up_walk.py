@@ -57,6 +57,7 @@ def write_walk(
     names: Mapping[int, str] | None = NAMES,
     distortion: tuple[float, ...] = (),
     metadata: Mapping[str, Mapping[str, str]] | None = None,
+    second_camera: bool = False,
 ) -> Path:
     """Write the log.
 
@@ -70,6 +71,7 @@ def write_walk(
         names: class table; None for none.
         distortion: of the calibration.
         metadata: further records.
+        second_camera: `/second/color` shows the same at the same stamps, inverted.
     """
     width, height = size
     colours, labels = wall(width, height, frames)
@@ -87,6 +89,9 @@ def write_walk(
             window = np.s_[:, SHIFT * i : SHIFT * i + width]
             color = _image(stamp, colours[window], "rgb8", 3 * width, cut=i in broken)
             log.add("/camera/color", color, stamp + DELAYS_NS["color"])
+            if second_camera:
+                inverted = _image(stamp, 255 - colours[window], "rgb8", 3 * width)
+                log.add("/second/color", inverted, stamp + DELAYS_NS["color"])
             if depth is not None and depth(i):
                 metres = np.full((height, width), 2000, "<u2")
                 metres[:4] = 0

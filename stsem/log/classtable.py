@@ -43,6 +43,11 @@ class ClassTable:
     source: str
 
     @property
+    def meaning(self) -> tuple[str, ...]:
+        """All that decides which class a pixel of a label image has, as text; equal for tables that say the same."""
+        return str(self.classes), str(self.raw_ids), str(self.ignored)
+
+    @property
     def colour_of(self) -> dict[int, Colour]:
         """Raw id -> colour; empty without colours."""
         return dict(zip(self.raw_ids, self.classes.colours, strict=False))

@@ -14,7 +14,7 @@ from stsem.classes import ClassSet, Labels
 from stsem.errors import ChannelError, DecodeError
 from stsem.frame import Depth, Frame, Image
 from stsem.log.assemble import Assembly, assemble
-from stsem.log.classtable import Translator
+from stsem.log.classtable import ClassTable, Translator
 from stsem.log.container.damage import Damage
 from stsem.log.container.files import Given, find_files, left_out, missing_files
 from stsem.log.container.store import Store
@@ -139,6 +139,7 @@ class Log:
 
     Attributes:
         classes: of the truth; None without labels or without a class table.
+        class_table: where they come from, with the ids of the label images; None likewise.
         camera: pinhole camera of the frames' images; None when the log has none, or one whose lens is not understood.
         plans: one per colour frame in the window, in order of index.
         period_ns: median distance of colour stamps.
@@ -156,6 +157,7 @@ class Log:
         self._truths: Recent[int, Labels | None] = Recent(self._decode_truth, IMAGES_KEPT)
         self._partners, inexact = pair_all(assembly)
         self.camera: Camera | None = assembly.optics.camera
+        self.class_table: ClassTable | None = assembly.table
         self.classes: ClassSet | None = assembly.table.classes if assembly.table else None
         self.period_ns: int = median_period_ns(self._color.rows) or UNKNOWN_PERIOD_NS
         self.plans: Sequence[FramePlan] = plan_all(assembly, self._partners, rows)

@@ -18,6 +18,8 @@ Images = npt.NDArray[np.uint8]
 MILLIMETRES = 1000.0
 MAX_DEPTH_M = 65.0
 """Depth is kept in whole millimetres of 16 bits; what is farther counts as unknown."""
+_TYPES = {"images": "uint8", "labels": "uint8", "depths_mm": "uint16"}
+"""Array in the file of a pair -> type of its elements."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +86,23 @@ class PairFolder:
         path = self._paths[index]
         try:
             with path.open("rb") as file, np.load(file) as arrays:
-                depths = in_metres(arrays["depths_mm"]) if "depths_mm" in arrays else None
-                return Pair(arrays["images"], arrays["labels"], depths)
+                return _pair({name: arrays[name] for name in arrays.files if name in _TYPES})
         except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as err:
             raise TrainingError(
                 f"The training pair {path} cannot be read ({err}); remove it and render it anew."
             ) from err
+
+
+def _pair(arrays: Mapping[str, npt.NDArray[Any]]) -> Pair:
+    """The pair of what `save_pair` wrote. Raises KeyError or ValueError for anything else."""
+    images, labels, depths = arrays["images"], arrays["labels"], arrays.get("depths_mm")
+    if images.ndim != 4 or images.shape[3] != 3 or images.size == 0:
+        raise ValueError(f"its images have the shape {images.shape}, not (2, H, W, 3)")
+    for name, array in arrays.items():
+        expected = (2, *images.shape[1:3], *((3,) if name == "images" else ()))
+        if array.dtype != _TYPES[name] or array.shape != expected:
+            raise ValueError(f"its {name} are {array.dtype} {array.shape}, not {_TYPES[name]} {expected}")
+    return Pair(images, labels, None if depths is None else in_metres(depths))
 
 
 def save_pair(path: Path, pair: Pair) -> None:

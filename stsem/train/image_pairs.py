@@ -45,7 +45,7 @@ class ImagePairs:
     """
 
     def __init__(self, folder: Path, table: ClassTable) -> None:
-        self._folder, self.classes = folder, table.classes
+        self._folder, self._table, self.classes = folder, table, table.classes
         self._translate, self._colour_of = Translator(table), table.colour_of
         self._images, labels = _by_stem(folder / IMAGES), _by_stem(folder / LABELS)
         self._labels = {stem: path for stem, path in labels.items() if stem in self._images}
@@ -62,7 +62,7 @@ class ImagePairs:
         """Of the files' names and sizes, and the class table."""
         files = (path for kind in (self._images, self._labels, self._depths) for path in kind.values())
         lines = [f"{path.relative_to(self._folder)} {path.stat().st_size}" for path in files]
-        return fingerprint([*lines, str(self.classes)])
+        return fingerprint([*lines, *self._table.meaning])
 
     def __len__(self) -> int:
         return len(self._pairs)

@@ -53,13 +53,7 @@ class LogPairs:
         return Pair(images, labels, np.stack([in_metres(frame["depth_mm"]) for frame in frames]))
 
     def _frame(self, number: int) -> dict[str, npt.NDArray[Any]]:
-        path = _file(self._folder, number)
-        try:
-            with path.open("rb") as file, np.load(file) as arrays:
-                return dict(arrays)
-        except (OSError, EOFError, ValueError, zipfile.BadZipFile) as err:
-            raise TrainingError(f"The decoded frame {path} cannot be read ({err}); remove its folder, "
-                                "and the log is decoded anew.") from err  # fmt: skip
+        return _arrays(_file(self._folder, number))
 
 
 def decode_log(log: Log, folder: Path, *, depth: bool = False, report: Report = lambda done, total: None) -> LogPairs:
@@ -75,7 +69,7 @@ def decode_log(log: Log, folder: Path, *, depth: bool = False, report: Report = 
         TrainingError: the log has no labels, or none of its labelled frames can be decoded.
         OutputError: the folder cannot be written.
     """
-    identity = fingerprint([log.info.sha256, f"{log.plans[0].stamp_ns} {len(log.plans)} {depth}", str(log.classes)])
+    identity = _identity(log, depth)
     if (folder / INDEX).is_file() and (there := LogPairs(folder)).fingerprint == identity:
         return there
     if log.classes is None or not any(plan.has_truth for plan in log.plans):
@@ -91,6 +85,14 @@ def decode_log(log: Log, folder: Path, *, depth: bool = False, report: Report = 
                             "stsem inspect says why.")  # fmt: skip
     _write_index(folder, log.classes, {"fingerprint": identity, "pairs": pairs, "unreadable": missing})
     return LogPairs(folder)
+
+
+def _identity(log: Log, depth: bool) -> str:
+    """Of all that decides the decoded frames: the log, its window, which channels were chosen, the class table."""
+    choice = log.info.choice
+    topics = f"{choice.color} {choice.depth if depth else None} {choice.labels} {choice.calibration}"
+    window = f"{log.plans[0].stamp_ns} {len(log.plans)} {depth}"
+    return fingerprint([log.info.sha256, window, topics, *(log.class_table.meaning if log.class_table else ())])
 
 
 def _decode(log: Log, folder: Path, numbers: Sequence[int], depth: bool, report: Report) -> dict[int, bool]:
@@ -120,8 +122,16 @@ def _keep(folder: Path, loaded: Loaded, *, depth: bool) -> bool:
 
 
 def _has_labels(folder: Path, number: int) -> bool:
-    with np.load(_file(folder, number)) as arrays:
-        return "labels" in arrays
+    return "labels" in _arrays(_file(folder, number))
+
+
+def _arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
+    try:
+        with path.open("rb") as file, np.load(file) as arrays:
+            return dict(arrays)
+    except (OSError, EOFError, ValueError, zipfile.BadZipFile) as err:
+        raise TrainingError(f"The decoded frame {path} cannot be read ({err}); remove its folder, "
+                            "and the log is decoded anew.") from err  # fmt: skip
 
 
 def _unlabelled(image: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:

@@ -83,8 +83,11 @@ def join(sources: Sequence[Source], classes: ClassSet, class_map: ClassMap) -> P
     Raises:
         ClassTableError: a source has other classes.
     """
-    parts = [Translated(one.pairs, lookup(one.classes, classes, _known(one, class_map), one.name)) for one in sources]
-    return Joined(parts)
+    tables = (lookup(one.classes, classes, _known(one, class_map), one.name) for one in sources)
+    return Joined([
+        Translated(one.pairs, table, known=len(one.classes), name=one.name)
+        for one, table in zip(sources, tables, strict=True)
+    ])  # fmt: skip
 
 
 def classes_of(sources: Sequence[Source], class_map: ClassMap) -> ClassSet:

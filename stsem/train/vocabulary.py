@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from stsem.classes import NO_LABEL, ClassSet, Labels, normalised
-from stsem.errors import ClassTableError
+from stsem.errors import ClassTableError, TrainingError
 from stsem.train.dataset import Pair, Pairs, fingerprint
 
 ClassMap = Mapping[str, str]
@@ -78,10 +78,12 @@ class Translated:
     Args:
         pairs: in ids of their own.
         table: (256,) uint8, from `lookup`.
+        known: number of classes that these ids are of.
+        name: of the data, for people.
     """
 
-    def __init__(self, pairs: Pairs, table: Labels) -> None:
-        self._pairs, self._table = pairs, table
+    def __init__(self, pairs: Pairs, table: Labels, *, known: int, name: str) -> None:
+        self._pairs, self._table, self._known, self._name = pairs, table, known, name
 
     @property
     def fingerprint(self) -> str:
@@ -92,8 +94,13 @@ class Translated:
         return len(self._pairs)
 
     def pair(self, index: int) -> Pair:
-        """The pair at `index`."""
+        """The pair at `index`. Raises TrainingError, also for an id that the data's class table does not have."""
         pair = self._pairs.pair(index)
+        beyond = pair.labels[(pair.labels >= self._known) & (pair.labels != NO_LABEL)]
+        if beyond.size:
+            raise TrainingError(f"Pair {index} of {self._name} has {beyond.size} pixels with the label {beyond.max()}, "
+                                f"but its class table has {self._known} classes, 0 to {self._known - 1}; mend one of "
+                                "them.")  # fmt: skip
         return Pair(pair.images, np.stack([np.asarray(cv2.LUT(x, self._table), np.uint8) for x in pair.labels]),
                     pair.depths)  # fmt: skip
 

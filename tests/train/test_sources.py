@@ -14,7 +14,7 @@ from stsem.classes import NO_LABEL, ClassSet
 from stsem.errors import ClassTableError, StsemError, TrainingError
 from stsem.log.log import open_log
 from stsem.train.consecutive import consecutive
-from stsem.train.dataset import Pairs, save_pair
+from stsem.train.dataset import PairFolder, Pairs, save_pair
 from stsem.train.log_pairs import decode_log
 from stsem.train.sources import Reading, classes_of, join, open_source
 from stsem.train.vocabulary import lookup, network_classes, read_class_map
@@ -91,6 +91,9 @@ def test_a_log_is_decoded_once_and_gone_on_with(tmp_path: Path) -> None:
     (folder / "0000001.npz").write_bytes(b"")
     with open_log([tmp_path / "other.mcap"]) as other, pytest.raises(TrainingError, match="0000001"):
         decode_log(other, folder).pair(0)
+    (folder / "frames.json").unlink()
+    with open_log([tmp_path / "other.mcap"]) as other, pytest.raises(TrainingError, match="0000001"):
+        decode_log(other, folder)
 
 
 def test_frames_that_cannot_be_decoded(tmp_path: Path) -> None:
@@ -189,6 +192,53 @@ def test_pairs_need_a_table_that_counts_from_zero(tmp_path: Path) -> None:
     table.write_text(json.dumps({"1": "dark", "2": "red"}))
     with pytest.raises(StsemError, match="counts from 0"):
         open_source([str(tmp_path)], Reading(tmp_path, table))
+
+
+@pytest.mark.parametrize(("arrays", "sentence"), [
+    ({"images": np.zeros((64, 96, 3), np.uint8)}, r"images have the shape \(64, 96, 3\), not \(2, H, W, 3\)"),
+    ({"images": np.zeros((2, 64, 96, 3), np.float32)}, "images are float32"),
+    ({"labels": np.zeros((2, 32, 48), np.uint8)}, r"labels are uint8 \(2, 32, 48\), not uint8 \(2, 64, 96\)"),
+    ({"labels": np.zeros((2, 64, 96), np.int64)}, "labels are int64"),
+    ({"depths_mm": np.zeros((2, 64, 96), np.float32)}, "depths_mm are float32"), ({"labels": None}, "labels"),
+])  # fmt: skip
+def test_pairs_of_another_form_are_refused(tmp_path: Path, arrays: dict[str, object], sentence: str) -> None:
+    """Not taken for what they are not: labels of another size would lie beside the image."""
+    good = {"images": np.zeros((2, 64, 96, 3), np.uint8), "labels": np.zeros((2, 64, 96), np.uint8)}
+    np.savez(tmp_path / "0.npz", **{name: array for name, array in (good | arrays).items() if array is not None})
+    with pytest.raises(TrainingError, match=f"0.npz cannot be read .*{sentence}"):
+        PairFolder(tmp_path).pair(0)
+
+
+def test_labels_beyond_the_class_table_are_not_lost_in_silence(tmp_path: Path) -> None:
+    """In whichever pair they are: they would have counted as ignored."""
+    save_pair(tmp_path / "0.npz", pair(0))
+    save_pair(tmp_path / "1.npz", pair(1))
+    (tmp_path / "classes.txt").write_text("dark\nred\ngreen\n")
+    whole = open_source([str(tmp_path)], Reading(tmp_path))
+    assert join([whole], whole.classes, {}).pair(1).labelled == (0, 1)
+    (tmp_path / "classes.txt").write_text("dark\nred\n")
+    source = open_source([str(tmp_path)], Reading(tmp_path))
+    with pytest.raises(TrainingError, match=r"Pair 1 of .* with the label 2, but its class table has 2 classes"):
+        join([source], source.classes, {}).pair(1)
+
+
+def test_frames_are_decoded_anew_for_other_channels_or_another_table(tmp_path: Path) -> None:
+    """Two cameras of one log have its sum, its stamps and its number of frames; a table may give ids other names."""
+    log, cache = write_walk(tmp_path / "walk.mcap", second_camera=True), tmp_path / "cache"
+    first, second = (
+        open_source([str(log)], Reading(cache, topics={"color": topic})).pairs
+        for topic in ("/camera/color", "/second/color")
+    )
+    assert first.fingerprint != second.fingerprint
+    assert np.array_equal(second.pair(0).images, 255 - _opened(log, cache, None).pair(0).images)
+    table = tmp_path / "table.json"
+    table.write_text(json.dumps({"0": "wall", "2": "floor", "5": "door"}))
+    own, other = _opened(log, cache, None).pair(0).labels, _opened(log, cache, table).pair(0).labels
+    assert np.array_equal(np.array([0, NO_LABEL, 1, *[NO_LABEL] * 253], np.uint8)[own], other)
+
+
+def _opened(log: Path, cache: Path, classes: Path | None) -> Pairs:
+    return open_source([str(log)], Reading(cache, classes, topics={"color": "/camera/color"})).pairs
 
 
 OFFICE = ClassSet(("office chair", "Desk", "stool", "wall"), ((1, 0, 0), (2, 0, 0), (3, 0, 0), (4, 0, 0)))
