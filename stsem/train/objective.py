@@ -16,11 +16,11 @@ BALANCE, FINE = 0.3, 2
 
 
 def class_weights(shares: npt.NDArray[np.float64], balance: float = BALANCE) -> Tensor:
-    """(C,) float32 weights share ** -balance with a mean of 1 over the pixels; a class without pixels weighs nothing.
+    """(C,) float32 weights share ** -balance, with a mean of 1 over the pixels; with `balance` 0 every pixel weighs 1.
 
-    With `balance` 0 every pixel weighs 1.
+    A share counts as at least 1e-4, also 0: the shares are those of a sample, which may miss a rare class.
     """
-    weights = np.where(shares > 0, np.maximum(shares, 1e-4) ** -balance, 0.0)
+    weights = np.maximum(shares, 1e-4) ** -balance
     return torch.from_numpy((weights / (weights * shares).sum()).astype(np.float32))
 
 

@@ -136,7 +136,7 @@ def find_recipe(name: str) -> Recipe:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
         raise UsageError(f"The recipe {name} is not valid TOML: {err}.") from err
     base = table.pop("base", None)
-    if base not in RECIPES:
+    if not isinstance(base, str) or base not in RECIPES:
         raise UsageError(f"The recipe {name} has base = {base!r}; write base = {' or '.join(map(repr, RECIPES))}.")
     return replace(RECIPES[base], **{"name": Path(name).stem} | {key: _value(name, key, table[key]) for key in table})
 

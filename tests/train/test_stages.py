@@ -194,7 +194,7 @@ def _in_words(value: object) -> str:
 
 @pytest.mark.parametrize(("text", "sentence"), [
     ('base = "scratch"\nitrations = 5', "unknown key 'itrations'; valid are iterations"),
-    ('base = "best"', "base = 'best'; write base = 'paper' or 'scratch'"),
+    ('base = "best"', "base = 'best'; write base = 'paper' or 'scratch'"), ("base = []", "base = []; write base"),
     ('base = "paper"\nrate = "fast"', "rate = 'fast'; expected a value like"),
     ('base = "paper"\ncrop = [1]', "crop = [1]"), ('base = "paper"\nbatch = 0', "batch = 0; it must be at least 1"),
     ('base = "paper"\nscales = [2, 1]', "smallest, largest"), ("base = ", "not valid TOML"),
