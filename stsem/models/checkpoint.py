@@ -131,7 +131,8 @@ def begin_with(
         except RuntimeError:
             return replace(loaded, note="The difference stream has another width than the colour's and is unchanged.")
     adapt_to_difference(difference, std=std, scale=scale)
-    copied = tuple(name for name in loaded.missing if name.startswith("difference.") and not loaded.adapt)
+    taken = {f"difference.{name.removeprefix('colour.')}" for name in loaded.matched if name.startswith("colour.")}
+    copied = tuple(name for name in loaded.missing if name in taken)  # no copy of what is random in the colour stream
     return replace(
         loaded, matched=(*loaded.matched, *copied), missing=tuple(x for x in loaded.missing if x not in copied),
         adapt=False, note="The difference stream starts from a colour stream's weights; train it before use.",
