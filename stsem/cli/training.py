@@ -20,7 +20,7 @@ from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
 from stsem.replay.settings import parse_topics
 from stsem.train.dataset import Pairs
-from stsem.train.job import Job, Stage
+from stsem.train.job import Job, Stage, stages_of
 from stsem.train.machine import machine
 from stsem.train.publish import load_checkpoint, publish
 from stsem.train.recipe import Recipe
@@ -167,7 +167,12 @@ def _starts(
             return dict(done)
         note("The difference stream has another width than the colour stream, so it begins with random weights.")
         return {}
-    return {} if wanted.weights is None else {"weights": wanted.weights}
+    if wanted.weights is not None:
+        return {"weights": wanted.weights}
+    known = [name for name, _ in stages_of(wanted.architecture)]
+    if before := known[: known.index(stage)]:
+        note(f"The stage {stage} begins with random weights: --stages leaves out {' and '.join(before)}.")
+    return {}
 
 
 def _publish(wanted: Wanted, job: Job, checkpoint: Path, architecture: str) -> Network:

@@ -134,3 +134,12 @@ def test_what_cannot_be_trained(cli: Cli, home: Path, arguments: tuple[object, .
     assert sentence in last
     assert last.startswith("stsem: ")
     assert "defect" not in last
+
+
+def test_a_stage_without_those_before_it_begins_at_random(cli: Cli, home: Path) -> None:
+    """And says so; a batch of one ends it here."""
+    common = (LOGS / "tiny-a.mcap", "--architecture", "pspnet-r18-w1", "--batch", "1", "--crop", "41x41")
+    said = {stages: cli("train", *common, "--stages", stages).err for stages in ("colour", "difference", "fused")}
+    assert "begins with random weights" not in said["colour"]
+    assert "The stage difference begins with random weights: --stages leaves out colour.\n" in said["difference"]
+    assert "stage fused begins with random weights: --stages leaves out colour and difference.\n" in said["fused"]
