@@ -20,7 +20,7 @@ def table1(found: Results) -> str:
     """Ways to fuse: mIoU and pixel accuracy beside the paper's, and the questions."""
     lines = [
         [row.words, _spread(found.spread(row.network)), _spread(found.spread(row.network, measure=accuracy)),
-         *(_paper(row, place) for place in range(2)), _seeds(found, row, "right")]
+         *(_paper(row, place, 2) for place in range(2)), _seeds(found, row, "right")]
         for row in TABLE1
     ]  # fmt: skip
     head = ["network", "mIoU", "pixel accuracy", "paper: mIoU", "paper: pixel accuracy", "seeds"]
@@ -38,7 +38,7 @@ def table2(found: Results) -> str:
     for row in TABLE2:
         means, whole = found.class_means(row.network, seeds=[0]), found.values(row.network, "right")
         if 0 in whole:
-            lines.append([row.words, *map(_number, means), f"**{_number(whole[0])}**", _paper(row, 0)])
+            lines.append([row.words, *map(_number, means), f"**{_number(whole[0])}**", _paper(row, 0, 1)])
     return _table(["network", *found.classes, "mIoU", "paper, Cityscapes"], lines)
 
 
@@ -114,8 +114,9 @@ def _spread(value: Spread | None) -> str:
     return f"{value.mean:.2f}" if value.deviation is None else f"{value.mean:.2f} ± {value.deviation:.2f}"
 
 
-def _paper(row: Row, place: int) -> str:
-    return f"{row.paper[place]:.2f}".rstrip("0") if row.paper else NOTHING
+def _paper(row: Row, place: int, digits: int) -> str:
+    """As the paper prints it."""
+    return f"{row.paper[place]:.{digits}f}" if row.paper else NOTHING
 
 
 def _number(value: float) -> str:

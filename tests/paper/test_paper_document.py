@@ -28,6 +28,13 @@ def _result(network: str, seed: int, right: int, dose: str = "right", called_flo
     }  # fmt: skip
 
 
+def test_the_papers_figures_stand_as_it_prints_them() -> None:
+    """Zeros at the end included: 96.30 and 70.0."""
+    assert "| feature map concatenation | - | - | 89.21 | 96.30 |" in PARTS["table1"](collect(ALL))
+    whole = PARTS["table2"](collect([_result("spatial-r50", 0, 80), _result("sum-r50", 0, 80)]))
+    assert [line.split("|")[-2].strip() for line in whole.splitlines()[2:]] == ["70.0", "71.1"]
+
+
 def _iou(right: int) -> float:
     return 100 * right / (200 - right)
 
