@@ -1,6 +1,8 @@
 """Fixtures shared by all tests."""
 
+import functools
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -42,3 +44,19 @@ def made_up_costs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("costs") / "made-up.json"
     profile.save(path)
     return path
+
+
+@pytest.fixture(scope="session")
+def operators_once() -> Iterator[None]:
+    """torch builds the same table of operators for every export, which takes 0.7 s; here it is built once."""
+    from torch.onnx._internal.exporter._registration import ONNXRegistry
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ONNXRegistry, "from_torchlib", staticmethod(functools.cache(ONNXRegistry.from_torchlib)))
+        yield
+
+
+@pytest.fixture(autouse=True)
+def _quick_exports(request: pytest.FixtureRequest) -> None:
+    if request.node.get_closest_marker("torch"):
+        request.getfixturevalue("operators_once")

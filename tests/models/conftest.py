@@ -2,7 +2,7 @@
 
 import functools
 import gc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,17 +34,7 @@ class Exported:
 
 
 @pytest.fixture(scope="session")
-def operators_once() -> Iterator[None]:
-    """torch builds the same table of operators for every export, which takes 0.7 s; here it is built once."""
-    from torch.onnx._internal.exporter._registration import ONNXRegistry
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ONNXRegistry, "from_torchlib", staticmethod(functools.cache(ONNXRegistry.from_torchlib)))
-        yield
-
-
-@pytest.fixture(scope="session")
-def exported(operators_once: None, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Exported]:
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Exported]:
     """A row of the zoo at a sixteenth of its channels, by name."""
     folder = tmp_path_factory.mktemp("zoo")
 
