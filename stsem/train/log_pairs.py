@@ -44,8 +44,14 @@ class LogPairs:
         return len(self._pairs)
 
     def pair(self, index: int) -> Pair:
-        """The pair at `index`. Raises TrainingError when a file is damaged."""
+        """The pair at `index`; where the log's images change their size between the two, the labelled one twice.
+
+        Raises:
+            TrainingError: a file is damaged.
+        """
         frames = [self._frame(number) for number in self._pairs[index]]
+        if frames[0]["image"].shape != frames[1]["image"].shape:
+            frames = [frames[1] if "labels" in frames[1] else frames[0]] * 2
         images = np.stack([frame["image"] for frame in frames])
         labels = np.stack([frame.get("labels", _unlabelled(frame["image"])) for frame in frames])
         if "depth_mm" not in frames[0]:

@@ -96,6 +96,20 @@ def test_a_log_is_decoded_once_and_gone_on_with(tmp_path: Path) -> None:
         decode_log(other, folder)
 
 
+def test_frames_whose_size_changes_have_no_predecessor(tmp_path: Path) -> None:
+    """A pair has one size: the labelled frame stands alone, as where its predecessor cannot be decoded."""
+    folder = tmp_path / "frames"
+    with open_log([write_walk(tmp_path / "walk.mcap", frames=4)]) as opened:
+        pairs = decode_log(opened, folder)
+    with np.load(folder / "0000001.npz") as arrays:
+        kept = {name: array[:32] for name, array in arrays.items()}
+    np.savez(folder / "0000001.npz", **kept)
+    for index, height in ((0, 32), (1, 64), (2, 64)):
+        seen = pairs.pair(index)
+        assert (seen.images.shape, seen.labels.shape) == ((2, height, 96, 3), (2, height, 96))
+        assert np.array_equal(seen.images[0], seen.images[1]) == (index < 2)
+
+
 def test_frames_that_cannot_be_decoded(tmp_path: Path) -> None:
     """A broken predecessor is left out, a broken labelled frame counted."""
     log = write_walk(tmp_path / "walk.mcap", truth=SPARSE, broken=frozenset({4, 9}))
