@@ -130,6 +130,9 @@ def _locate(path_or_name: str | Path) -> Path:
     if str(path_or_name) in shipped_networks():
         return SHIPPED / f"{path_or_name}.onnx"
     known = ", ".join((*shipped_networks(), "oracle"))
+    if str(path_or_name) == "oracle":
+        raise NetworkError("The oracle is the truth of a log and has no file; give a file ending in .onnx, or one of "
+                           f"{', '.join(shipped_networks())}.")  # fmt: skip
     raise NetworkError(f"There is no network {str(path_or_name)!r}; give a file ending in .onnx, or one of {known}.")
 
 

@@ -109,6 +109,9 @@ def find_inputs(
         roles = dict(zip(wanted, there, strict=True))
     roles = {role: roles.get(role, PREFIX + role) for role in wanted}
     listed = ", ".join(map(shown, there)) or "none"
+    if unknown := [role for role in named if role not in wanted]:
+        raise NetworkError(f"The sidecar calls for {', '.join(wanted)} and not for {unknown[0]!r}, which --input "
+                           "names; difference and depth need a section of that name in it.")  # fmt: skip
     for role, name in roles.items():
         if name not in there:
             raise NetworkError(f"The network has no input {shown(name)} for the {role}, but {listed}; name it with "

@@ -81,6 +81,8 @@ def test_a_missing_file_and_an_unknown_name(tmp_path: Path) -> None:
     """A suffix .onnx means a file; anything else is a name, and the known ones are listed."""
     with pytest.raises(NetworkError, match="There is no network file"):
         load_network(tmp_path / "none.onnx")
+    with pytest.raises(NetworkError, match="The oracle is the truth of a log and has no file"):
+        load_network("oracle")  # as `stsem quantize oracle` would
     with pytest.raises(NetworkError, match=r"There is no network 'defualt'.*oracle"):
         load_network("defualt")
 

@@ -201,6 +201,7 @@ REFUSED: dict[str, tuple[dict[str, Any], Told, dict[str, Any], str]] = {
     "layout": ({"shape": ("n", "c", "h", "w")}, Told(), {}, "does not tell where its 3 channel(s)"),
     "type": ({"kind": TensorProto.INT64}, Told(), {}, "is of type int64; it must be one of float32"),
     "another input": ({"more": ("training",)}, Told(), {}, "also has the input 'training'"),
+    "no such role": ({}, Told({"imgae": "image"}), {}, "calls for image and not for 'imgae', which --input names"),
     "no such input": ({}, Told({"image": "pixels"}), {}, "no input 'pixels' for the image, but 'image'"),
     "no such output": ({}, Told(output="out"), {}, "no output 'out': 'labels'; choose one with --output"),
     "depth": ({}, Told(), {"inputs": {"image": 3, "depth": 1}}, "no input 'depth' for the depth, but 'image'"),
