@@ -21,6 +21,7 @@ def test_the_table_is_counted() -> None:
     """Names, weights, multiply-adds and papers; `python -m stsem.models.cost` writes them again, and
     `stsem export --list` prints the document's table."""
     assert kept() == tuple(map(counted, ZOO))
+    assert all(size.parameters > 1e6 and size.multiply_adds > 1e9 for size in kept())
     assert table() in DOCUMENT
 
 

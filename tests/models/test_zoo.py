@@ -7,7 +7,6 @@ torch = pytest.importorskip("torch", reason="the extra 'train' is not installed"
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 
 from stsem.errors import UsageError
-from stsem.models.cost import cost
 from stsem.models.network import CHANNELS, SegmentationNetwork
 from stsem.models.zoo import ALIASES, ZOO, build
 from stsem.train.objective import Objective
@@ -56,7 +55,7 @@ def test_gradients_reach_every_weight(name: str) -> None:
 
 @pytest.mark.parametrize("name", ZOO)
 def test_every_row_is_complete(name: str) -> None:
-    """A paper to read, inputs there are, a good side near every side, and a cost at the full width."""
+    """A paper to read, inputs there are, and a good side near every side; test_networks_doc.py counts sizes."""
     row = ZOO[name]
     assert all((row.paper.authors, row.paper.title, row.paper.figure))
     with torch.device("meta"):
@@ -64,9 +63,6 @@ def test_every_row_is_complete(name: str) -> None:
     assert set(network.inputs) <= CHANNELS.keys()
     for side in (1, 96, 97, 270, 473):
         assert network.fits(network.nearest_side(side))
-    counted = cost(name, 13)
-    assert counted.parameters > 1e6
-    assert counted.multiply_adds > 1e9
 
 
 def test_names() -> None:
