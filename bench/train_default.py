@@ -1,6 +1,6 @@
 """How the shipped network is published and judged; `stsem train` trains it. See docs/training.md for the commands.
 
-python bench/train_default.py publish --checkpoint .scratch/a/fused/checkpoint.pt --size 617 377 --out default.onnx
+python bench/train_default.py publish --checkpoint .scratch/a/fused/checkpoint.pt --size 713 425 --passes 4 --out default.onnx
 python bench/train_default.py judge   --network default --pairs .scratch/validation
 python bench/train_default.py judge   --network default --log logs/office.mcap
 """
@@ -38,7 +38,7 @@ def _sidecar(size: tuple[int, int], note: str = "") -> Sidecar:
 def _publish(args: argparse.Namespace) -> None:
     network = load_checkpoint(args.checkpoint, len(OFFICE))
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    print(publish(network, _sidecar(tuple(args.size), args.note), args.out).sha256)
+    print(publish(network, _sidecar(tuple(args.size), args.note), args.out, passes=args.passes).sha256)
 
 
 Sample = tuple[Image, Image | None, Labels]
@@ -110,6 +110,7 @@ def _arguments() -> argparse.Namespace:
     export.add_argument("--size", type=int, nargs=2, default=(473, 281))
     export.add_argument("--out", type=Path, required=True)
     export.add_argument("--note", default="")
+    export.add_argument("--passes", type=int, default=0, help="of Monte Carlo dropout, for maps of uncertainty")
     judge = verbs.add_parser("judge")
     judge.set_defaults(run=_judge)
     judge.add_argument("--network", default="default")
