@@ -1,6 +1,6 @@
 """How the shipped network is published and judged; `stsem train` trains it. See docs/training.md for the commands.
 
-python bench/train_default.py publish --checkpoint .scratch/a/fused/checkpoint.pt --size 713 425 --passes 4 --out default.onnx
+python bench/train_default.py publish --checkpoint .scratch/a/fused/checkpoint.pt --size 713 425 --passes 4 --out a.onnx
 python bench/train_default.py judge   --network default --pairs .scratch/validation
 python bench/train_default.py judge   --network default --log logs/office.mcap
 """
