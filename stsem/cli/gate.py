@@ -25,7 +25,7 @@ def gate(
     ] = None,
     timing: Annotated[bool, typer.Option("--timing/--no-timing", help="Gate latency and rate, too.")] = True,
     exact: Annotated[
-        bool | None, typer.Option("--exact/--no-exact", help="Same results to the byte. [oracle runs]")
+        bool | None, typer.Option("--exact/--no-exact", help=r"Same results to the byte. \[oracle runs]")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write the Markdown verdict here.")] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON instead of Markdown.")] = False,

@@ -39,3 +39,18 @@ def test_every_choice_is_named_beside_its_option(help_text: str, option: str) ->
     named = set(re.findall(r"[\w:-]+", line.partition(option)[2]))
     assert CHOICES[option]
     assert set(CHOICES[option]) <= named
+
+
+@pytest.mark.parametrize(("option", "default"), [("--out", "[training]"), ("--recipe", "[scratch]"), ("--seed", "[0]")])
+def test_defaults_in_square_brackets_are_shown(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], option: str, default: str
+) -> None:
+    """They are no markup."""
+    monkeypatch.setenv("TERMINAL_WIDTH", "400")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setattr(sys, "argv", ["stsem", "train", "--help"])
+    with pytest.raises(SystemExit):
+        main.stsem()
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if re.match(rf"\W*{option}(?!\S)", line))
+    assert default in line
+    assert "\\" not in line
