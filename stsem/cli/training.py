@@ -15,10 +15,12 @@ from stsem.errors import TrainingStoppedError, UsageError
 from stsem.inference.network import Network
 from stsem.inference.sidecar import Difference, Sidecar
 from stsem.inference.threads import set_threads
+from stsem.log.classtable import read_class_map
 from stsem.log.container.source import without_secrets
 from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
 from stsem.replay.settings import parse_topics
+from stsem.report.wording import plural
 from stsem.train.dataset import Pairs
 from stsem.train.job import Job, Stage, stages_of
 from stsem.train.machine import machine
@@ -27,7 +29,6 @@ from stsem.train.recipe import Recipe
 from stsem.train.sources import Reading, Source, classes_of, join, open_source
 from stsem.train.stages import train_stage
 from stsem.train.starts import given_weights
-from stsem.train.vocabulary import read_class_map
 
 MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Of ImageNet's images, RGB in 0..1: what weights from elsewhere expect."""
@@ -93,7 +94,8 @@ def _read(wanted: Wanted, architecture: str) -> Read:
         note("No validation data was given (--validation): nothing will tell whether the network knows more than "
              "what it was trained on.")  # fmt: skip
     pairs = join(sources, classes, class_map)
-    note(f"{len(pairs)} pairs of {len(sources)} data sets, {len(classes)} classes.")
+    note(f"{plural(len(pairs), 'pair')} of {plural(len(sources), 'data set')}, "
+         f"{plural(len(classes), 'class')}.")  # fmt: skip
     return Read(classes, pairs, join(others, classes, class_map) if others else None, sources[0].size)
 
 
@@ -188,5 +190,5 @@ def _print(published: Network, wanted: Wanted) -> None:
     size = published.path.stat().st_size / 1e6
     log = next((name for name in (*wanted.validation, *wanted.data) if name.endswith(".mcap")), "LOG")
     command = shlex.join(["stsem", "replay", without_secrets(log), "--model", str(published.path)])
-    print(f"Network: {published.path} ({size:.1f} MB, {len(published.classes)} classes, {width}x{height})")
+    print(f"Network: {published.path} ({size:.1f} MB, {plural(len(published.classes), 'class')}, {width}x{height})")
     print(f"Replay:  {command}")

@@ -172,6 +172,23 @@ def read_file(path: Path) -> ClassTable:
         raise ClassTableError(f"The class table {path} is not TOML ({err}); mend the file.") from err
 
 
+def read_class_map(path: Path) -> dict[str, str]:
+    """A class map from TOML, name -> name: `"office chair" = "chair"`.
+
+    Raises:
+        ClassTableError: it cannot be read or is none.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as err:
+        raise ClassTableError(f"The class map {path} cannot be read: {err.strerror or err}.") from err
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
+        raise ClassTableError(f"The class map {path} is not valid TOML: {err}.") from err
+    if bad := [key for key, value in table.items() if not isinstance(value, str)]:
+        raise ClassTableError(f'The class map {path} gives no class name for {bad[0]!r}; write it as name = "name".')
+    return table
+
+
 def _parse_json(data: bytes, source: str) -> ClassTable:
     try:
         document = json.loads(data)

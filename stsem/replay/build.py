@@ -1,6 +1,5 @@
 """From a configuration and a log to the objects of a run. The only place where stages get their numbers."""
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +13,7 @@ from stsem.inference.backends import choose_backend
 from stsem.inference.cache import CachedInferencer, OutputCache, cache_root
 from stsem.inference.network import Network, load_network
 from stsem.inference.variant import at_precision
+from stsem.log.classtable import read_class_map
 from stsem.log.log import Log
 from stsem.log.plan import NEEDS
 from stsem.replay.answer import AnswerRule, Prediction
@@ -67,7 +67,7 @@ def build_model(log: Log, config: RunConfig) -> Model:
         ChannelError: the network takes depth, but the log has none that can be used.
     """
     choose_backend(config.backend, config.precision)
-    class_map = _class_map(config.class_map)
+    class_map = read_class_map(config.class_map) if config.class_map else {}
     if config.is_oracle:
         return _oracle(log)
     network = at_precision(load_network(config.model), config.precision)
@@ -145,20 +145,6 @@ def _meeting(network: ClassSet, log: Log, class_map: dict[str, str]) -> tuple[Cl
             "common; say which are the same with --class-map"
         )  # fmt: skip
     return log.classes, table, ""
-
-
-def _class_map(path: Path | None) -> dict[str, str]:
-    if path is None:
-        return {}
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as err:
-        raise ClassTableError(f"The class map {path} cannot be read: {err.strerror or err}.") from err
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
-        raise ClassTableError(f"The class map {path} is not valid TOML: {err}.") from err
-    if bad := [key for key, value in table.items() if not isinstance(value, str)]:
-        raise ClassTableError(f'The class map {path} gives no class name for {bad[0]!r}; write it as name = "name".')
-    return table
 
 
 def _network_segmenter(

@@ -1,8 +1,6 @@
 """From the classes of the data to those of the network."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -13,23 +11,6 @@ from stsem.train.dataset import Pair, Pairs, fingerprint
 
 ClassMap = Mapping[str, str]
 """Name in the data -> name in the network; "" for pixels that are not to be learned. Other names stay."""
-
-
-def read_class_map(path: Path) -> dict[str, str]:
-    """A class map from TOML: `"office chair" = "chair"`.
-
-    Raises:
-        ClassTableError: it cannot be read or is none.
-    """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as err:
-        raise ClassTableError(f"The class map {path} cannot be read: {err.strerror or err}.") from err
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
-        raise ClassTableError(f"The class map {path} is not valid TOML: {err}.") from err
-    if bad := [key for key, value in table.items() if not isinstance(value, str)]:
-        raise ClassTableError(f'The class map {path} gives no class name for {bad[0]!r}; write it as name = "name".')
-    return table
 
 
 def network_classes(data: ClassSet, class_map: ClassMap) -> ClassSet:

@@ -12,12 +12,13 @@ import pytest
 
 from stsem.classes import NO_LABEL, ClassSet
 from stsem.errors import ClassTableError, StsemError, TrainingError
+from stsem.log.classtable import read_class_map
 from stsem.log.log import open_log
 from stsem.train.consecutive import consecutive
 from stsem.train.dataset import PairFolder, Pairs, save_pair
 from stsem.train.log_pairs import decode_log
 from stsem.train.sources import Reading, classes_of, join, open_source
-from stsem.train.vocabulary import lookup, network_classes, read_class_map
+from stsem.train.vocabulary import lookup, network_classes
 from tests.made_up_walk import NAMES, write_walk
 
 from .squares import pair
