@@ -40,7 +40,7 @@ def export(
     passes: Annotated[
         int,
         typer.Option(
-            "--uncertainty", metavar="PASSES", min=0,
+            "--uncertainty", metavar="PASSES", min=0, max=1000,
             help="Passes of Monte Carlo dropout, for maps of variance, entropy and mutual information; 0 for none.",
         ),
     ] = 0,

@@ -2,6 +2,7 @@
 
 import functools
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -21,6 +22,8 @@ _ENDINGS = {
     name: getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 }  # fmt: skip
 """Signals that end a command in order: what it was writing is removed."""
+_NO_MEMORY = re.compile(r"can't allocate memory|Insufficient memory|out of memory")
+"""What torch and OpenCV say instead of raising MemoryError."""
 
 
 def launch(app: typer.Typer) -> NoReturn:
@@ -90,8 +93,9 @@ def _ended(came: Sequence[int]) -> str:
 
 def _unexpected(err: Exception) -> str:
     """What nobody foresaw, in one sentence."""
-    if isinstance(err, MemoryError):
-        return "The memory of this machine is used up; close other programs or take a smaller window."
+    if isinstance(err, MemoryError) or _NO_MEMORY.search(str(err)):
+        return ("The memory of this machine is used up; close other programs, or take less at once: a shorter window, "
+                "a smaller network, crop or batch.")  # fmt: skip
     if isinstance(err, OSError):
         place = f" ({err.filename})" if err.filename else ""
         return f"The system refused{place}: {err.strerror or err}."

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 from stsem.errors import UsageError
 from stsem.log.container.source import is_url, without_secrets
@@ -32,5 +33,6 @@ def check_once(given: Sequence[str]) -> None:
     Raises:
         UsageError: one was.
     """
-    if twice := [one for one in given if given.count(one) > 1]:
-        raise UsageError(f"{without_secrets(twice[0])} was given twice; give each log once.")
+    places = [one if is_url(one) else str(Path(one).resolve()) for one in given]
+    if twice := [one for one, place in zip(given, places, strict=True) if places.count(place) > 1]:
+        raise UsageError(f"{without_secrets(twice[-1])} was given twice; give each log once.")

@@ -11,6 +11,7 @@ from stsem.aside import aside
 from stsem.cli.console import is_terminal, note
 from stsem.errors import OutputError
 from stsem.report.plots.training import training_curves
+from stsem.report.wording import plural
 from stsem.train.curves import read_csv
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def shown(job: "Job") -> Iterator[Callable[["Progress"], None]]:
     clock = _TimeLeft()
     label = f"{job.stage} ({job.architecture})"
     if not is_terminal():
-        note(f"Training {label}, {job.numbers.iterations} iterations.")
+        note(f"Training {label}, {plural(job.numbers.iterations, 'iteration')}.")
         yield lambda now: note(f"{now.iteration}/{now.iterations}, {_said(now)}, {clock.left(now)}")
         return
     from rich.console import Console

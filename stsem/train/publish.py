@@ -1,5 +1,6 @@
 """A checkpoint -> the two files that a user runs: ONNX and sidecar, checked against torch."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from stsem import chance
 from stsem.errors import NetworkError, OutputError
 from stsem.inference.network import CLASS_COUNT, Network, load_network
 from stsem.inference.preprocess import network_inputs
-from stsem.inference.sidecar import Sidecar, render
+from stsem.inference.sidecar import Sidecar, parse, render
 from stsem.models.export import Agreement, agreement, export_onnx
 from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
@@ -52,10 +53,7 @@ def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passe
             "The network takes the image difference, but its sidecar has no section [difference]; add one with a scale."
         )
     export_onnx(network, path, size=sidecar.size, metadata={CLASS_COUNT: str(len(sidecar.classes))}, passes=passes)
-    try:
-        path.with_suffix(".toml").write_text(render(described), encoding="utf-8")
-    except OSError as err:
-        raise OutputError(f"The sidecar of {path} cannot be written: {err.strerror}.") from err
+    _write_beside(path, described)
     published = load_network(path)
     found = _agreement_on_noise(network, published, passes)
     if not found.holds:
@@ -63,6 +61,18 @@ def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passe
             f"The exported network {path} does not answer as torch does: equal are {found}; do not use it."
         )
     return published
+
+
+def _write_beside(path: Path, sidecar: Sidecar) -> None:
+    """The sidecar of `path`; one that says the same already stays, with its comments. Raises OutputError."""
+    beside = path.with_suffix(".toml")
+    try:
+        with suppress(FileNotFoundError, UnicodeDecodeError, NetworkError):
+            if parse(beside.read_text(encoding="utf-8"), str(beside)) == sidecar:
+                return
+        beside.write_text(render(sidecar), encoding="utf-8")
+    except OSError as err:
+        raise OutputError(f"The sidecar of {path} cannot be written: {err.strerror}.") from err
 
 
 def _agreement_on_noise(network: SegmentationNetwork, published: Network, passes: int) -> Agreement:

@@ -1,6 +1,8 @@
 """Recipes: all numbers of a training as data."""
 
 import difflib
+import json
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -77,7 +79,10 @@ class Recipe:
         for name, least in _LEAST.items():
             if not getattr(self, name) >= least:
                 raise UsageError(f"The recipe has {name} = {getattr(self, name)}; it must be at least {least}.")
-        if min(self.crop) < 1 or not 0 < self.scales[0] <= self.scales[1]:
+        for name, most in _MOST.items():
+            if not getattr(self, name) <= most:
+                raise UsageError(f"The recipe has {name} = {getattr(self, name)}; it must be at most {most}.")
+        if min(self.crop) < 1 or not 0 < self.scales[0] <= self.scales[1] < math.inf:
             raise UsageError(f"The recipe has crop = {list(self.crop)} and scales = {list(self.scales)}; "
                              "expected [width, height] and [smallest, largest], all above 0.")  # fmt: skip
         if self.optimiser not in ("sgd", "adamw"):
@@ -99,6 +104,7 @@ _LEAST = {
     "report_every": 1, "validate_every": 1, "rate": 0.0, "fused_rate": 0.0, "clip": 0.0, "average": 0.0, "warm_up": 0,
     "stretch": 0.0, "new_layers": 0.0, "balance": 0.0, "decay": 0.0, "momentum": 0.0, "power": 0.0, "still": 0.0,
 }  # fmt: skip
+_MOST = {"momentum": 1.0, "average": 1.0, "still": 1.0, "rate": 1e6, "fused_rate": 1e6}
 
 PAPER = Recipe(
     name="paper", pretrained=True, iterations=20_000, batch=3, fused_iterations=20_000, fused_batch=1, crop=(521, 521),
@@ -160,8 +166,9 @@ def _value(where: str, key: str, value: Any) -> Any:
     """`value` in the type of the recipe's field `key`."""
     known = {field.name: getattr(SCRATCH, field.name) for field in fields(Recipe)}
     if key not in known:
-        near = difflib.get_close_matches(key, known, 1, 0.5) or sorted(known)
-        raise UsageError(f"The recipe {where} has an unknown key {key!r}; valid are {', '.join(near)}.")
+        near = difflib.get_close_matches(key, known, 1, 0.6)
+        hint = f"did you mean {near[0]!r}?" if near else f"valid are {', '.join(sorted(known))}."
+        raise UsageError(f"The recipe {where} has an unknown key {key!r}; {hint}")
     expected = known[key]
     if isinstance(expected, tuple) and isinstance(value, list) and len(value) == len(expected):
         return tuple(_value_like(where, key, one, like) for one, like in zip(value, expected, strict=True))
@@ -172,5 +179,5 @@ def _value_like(where: str, key: str, value: Any, like: Any) -> Any:
     if type(like) is float and type(value) is int:
         return float(value)
     if type(value) is not type(like):
-        raise UsageError(f"The recipe {where} has {key} = {value!r}; expected a value like {like!r}.")
+        raise UsageError(f"The recipe {where} has {key} = {value!r}; expected a value like {json.dumps(like)}.")
     return value

@@ -62,6 +62,14 @@ def test_the_sidecar_follows_the_inputs(cli: Cli, sidecar: Path, tmp_path: Path)
     assert not (tmp_path / "other.onnx").exists()
 
 
+def test_a_sidecar_of_the_users_own_stays(cli: Cli, tmp_path: Path) -> None:
+    """With its comments, when it is the network's own and says what would be written."""
+    own, text = tmp_path / "net.toml", "# mine\n" + render(replace(SIDECAR, difference=None))
+    own.write_text(text, encoding="utf-8")
+    ran = cli("export", tmp_path / "net.onnx", "--sidecar", own, "--architecture", "segnet-basic-w1")
+    assert (ran.code, own.read_text(encoding="utf-8")) == (0, text)
+
+
 def test_weights_from_elsewhere(cli: Cli, sidecar: Path, tmp_path: Path) -> None:
     """What was taken, and what was not."""
     weights, out = tmp_path / "colour.pt", tmp_path / "net.onnx"

@@ -39,6 +39,9 @@ def raising(error: BaseException) -> Callable[[], int]:
         (KeyboardInterrupt(), 1, "Interrupted; nothing half-written is left behind."),
         (RuntimeError("two\nlines"), 1, "This is a defect of stsem, please report it with STSEM_DEBUG=1: "
          "RuntimeError: two lines."),
+        (RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 9 bytes."), 1,
+         "The memory of this machine is used up; close other programs, or take less at once: a shorter window, a "
+         "smaller network, crop or batch."),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
 )  # fmt: skip

@@ -30,3 +30,9 @@ def test_grouping(paths: list[str], groups: list[list[str]]) -> None:
 def test_a_log_given_twice_is_refused_without_its_token() -> None:
     with pytest.raises(UsageError, match=r"^https://h/a\.mcap was given twice"):
         recordings(["https://h/a.mcap?token=1", "https://h/a.mcap?token=1"])
+
+
+@pytest.mark.parametrize("again", ["./a.mcap", "x/../a.mcap"])
+def test_a_log_given_twice_in_other_words_is_refused(again: str) -> None:
+    with pytest.raises(UsageError, match="was given twice"):
+        recordings(["a.mcap", again])

@@ -193,12 +193,15 @@ def _in_words(value: object) -> str:
 
 
 @pytest.mark.parametrize(("text", "sentence"), [
-    ('base = "scratch"\nitrations = 5', "unknown key 'itrations'; valid are iterations"),
+    ('base = "scratch"\nitrations = 5', "unknown key 'itrations'; did you mean 'iterations'?"),
     ('base = "best"', "base = 'best'; write base = 'paper' or 'scratch'"), ("base = []", "base = []; write base"),
     ('base = "paper"\nrate = "fast"', "rate = 'fast'; expected a value like"),
     ('base = "paper"\ncrop = [1]', "crop = [1]"), ('base = "paper"\nbatch = 0', "batch = 0; it must be at least 1"),
     ('base = "paper"\nscales = [2, 1]', "smallest, largest"), ("base = ", "not valid TOML"),
-    ('base = "paper"\noptimiser = "lion"', "choose 'sgd' or 'adamw'"),
+    ('base = "paper"\noptimiser = "lion"', "choose 'sgd' or 'adamw'"), ('base = "paper"\nscales = [1, inf]', "above 0"),
+    ('base = "paper"\nmomentum = 5', "momentum = 5.0; it must be at most 1"),
+    ('base = "paper"\nscales = [1]', "expected a value like [1.0, 2.0]"),
+    ('base = "paper"\nlight = 1', "expected a value like true"),
 ])  # fmt: skip
 def test_recipes_in_files_that_cannot_be(tmp_path: Path, text: str, sentence: str) -> None:
     """One sentence."""
@@ -225,6 +228,6 @@ def test_assignments() -> None:
     scratch = RECIPES["scratch"]
     changed = with_assignments(scratch, ["scales=[1, 1.7]", "warm_up = 50", 'optimiser="sgd"'])
     assert changed == replace(scratch, scales=(1.0, 1.7), warm_up=50, optimiser="sgd")
-    for text, sentence in (("warm_up", "KEY=VALUE"), ("warmup=5", "valid are warm_up"), ("batch=1.5", "like 8")):
+    for text, sentence in (("warm_up", "KEY=VALUE"), ("warmup=5", "did you mean 'warm_up'"), ("batch=1.5", "like 8")):
         with pytest.raises(UsageError, match=sentence):
             with_assignments(scratch, [text])
