@@ -6,10 +6,11 @@
     folder/depth/*.png        if there is any: depth of equal stem, 16 bits, millimetres, 0 unknown
     folder/classes.json       the class table, as for a log (.json or .toml), or .txt with a name a line
 
-Images without labels are the predecessors of others.
+Images without labels are the predecessors of others. Where the size changes from one to the next, the labelled one
+stands alone.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,16 @@ from stsem.errors import TrainingError
 from stsem.log.classtable import ClassTable, Translator
 from stsem.log.container.files import natural
 from stsem.log.pixels import decode
+from stsem.log.pixels.exif import UPRIGHT, orientation
+from stsem.log.pixels.formats import UNKNOWN, file_format
 from stsem.log.schemas.messages import CompressedImage
 from stsem.train.consecutive import consecutive
 from stsem.train.dataset import Pair, fingerprint
 
 IMAGES, LABELS, DEPTH = "images", "labels", "depth"
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
+_HEAD = 4096
+"""Bytes of a JPEG that its EXIF tags are looked for in."""
 
 
 class ImagePairs:
@@ -35,17 +40,18 @@ class ImagePairs:
     Args:
         folder: with `images` and `labels`.
         table: class table of the label images.
+        depth: read it, too.
 
     Attributes:
         classes: of the table; labels have its ids.
         orphans: label images without a colour image.
 
     Raises:
-        TrainingError: there is no labelled image, or two images have one stem.
+        TrainingError: there is no labelled image, two images have one stem, or one is to be turned for viewing.
     """
 
-    def __init__(self, folder: Path, table: ClassTable) -> None:
-        self._folder, self._table, self.classes = folder, table, table.classes
+    def __init__(self, folder: Path, table: ClassTable, *, depth: bool = True) -> None:
+        self._folder, self._table, self.classes, self._with_depth = folder, table, table.classes, depth
         self._translate, self._colour_of = Translator(table), table.colour_of
         self._images, labels = _by_stem(folder / IMAGES), _by_stem(folder / LABELS)
         self._labels = {stem: path for stem, path in labels.items() if stem in self._images}
@@ -54,8 +60,10 @@ class ImagePairs:
         self._pairs = [pair for sequence in _sequences(self._images)
                        for pair in _stem_pairs(sequence, self._labels)]  # fmt: skip
         if not self._pairs:
-            raise TrainingError(f"The folder {folder} has {len(self._images)} images in {IMAGES} and {len(labels)} in "
-                                f"{LABELS}, but none of equal name; lay it out as docs/train.md says.")  # fmt: skip
+            raise TrainingError(f"The folder {folder} has {len(self._images)} images (png, jpg, webp) in {IMAGES} and "
+                                f"{len(labels)} label images (png) in {LABELS}, but none of equal name; lay it out as "
+                                "docs/train.md says.")  # fmt: skip
+        _refuse_turned(self._images.values())
 
     @property
     def fingerprint(self) -> str:
@@ -71,11 +79,14 @@ class ImagePairs:
         """The pair at `index`. Raises TrainingError: a file cannot be read, has another size, or an unknown id."""
         stems = self._pairs[index]
         images = [_read(self._images[stem], decode.colour) for stem in stems]
-        for stem, image in zip(stems, images, strict=True):
-            _same_size(self._images[stem], image, self._images[stems[0]], images[0])
+        if images[0].shape != images[1].shape:
+            alone = 1 if stems[1] in self._labels else 0
+            stems, images = (stems[alone],) * 2, [images[alone]] * 2
         labels = [self._truth(stem, image) for stem, image in zip(stems, images, strict=True)]
-        depths = [self._depth(stem, image) for stem, image in zip(stems, images, strict=True)] if self._depths else None
-        return Pair(np.stack(images), np.stack(labels), None if depths is None else np.stack(depths))
+        depths = None
+        if self._depths and self._with_depth:
+            depths = np.stack([self._depth(stem, image) for stem, image in zip(stems, images, strict=True)])
+        return Pair(np.stack(images), np.stack(labels), depths)
 
     def _truth(self, stem: str, image: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
         path = self._labels.get(stem)
@@ -127,9 +138,28 @@ def _stem_pairs(sequence: list[str], labels: dict[str, Path]) -> list[tuple[str,
     return [(sequence[a], sequence[b]) for a, b in consecutive([stem in labels for stem in sequence])]
 
 
+def _refuse_turned(images: Iterable[Path]) -> None:
+    """Of an image that viewers turn nobody knows which way round its labels are. Raises TrainingError."""
+    for path in images:
+        if path.suffix.lower() not in (".jpg", ".jpeg"):
+            continue
+        try:
+            with path.open("rb") as file:
+                turned = orientation(file.read(_HEAD)) != UPRIGHT
+        except OSError as err:
+            raise TrainingError(f"The image {path} cannot be used: {err.strerror or err}.") from err
+        if turned:
+            raise TrainingError(f"The image {path} has an EXIF tag that turns it for viewing, and its labels may be "
+                                "either way round; turn its pixels and drop the tag (mogrify -auto-orient), and look "
+                                "whether the labels fit.")  # fmt: skip
+
+
 def _read(path: Path, convert: Callable[[CompressedImage], Any]) -> Any:
     try:
-        return convert(CompressedImage(None, "", "", memoryview(path.read_bytes())))
+        message = CompressedImage(None, "", path.suffix[1:], memoryview(path.read_bytes()))
+        if file_format(message) == UNKNOWN:
+            raise ValueError("it is neither png nor jpeg nor webp" if message.data else "it is empty")
+        return convert(message)
     except (OSError, ValueError) as err:
         reason = err.strerror if isinstance(err, OSError) else err
         raise TrainingError(f"The image {path} cannot be used: {reason}.") from err
@@ -139,4 +169,4 @@ def _same_size(path: Path, image: npt.NDArray[Any], other: Path, like: npt.NDArr
     if image.shape[:2] != like.shape[:2]:
         (height, width), (high, wide) = image.shape[:2], like.shape[:2]
         raise TrainingError(f"{path} is {width}x{height}, but {other} is {wide}x{high}; "
-                            "images of a sequence, their labels and depth need one size.")  # fmt: skip
+                            "an image, its labels and its depth need one size.")  # fmt: skip

@@ -66,8 +66,8 @@ def open_source(parts: Sequence[str], how: Reading) -> Source:
     if is_url(parts[0]) or not folder.is_dir():
         return _log(parts, how)
     if is_image_folder(folder):
-        images = ImagePairs(folder, _table(folder, how.classes_file))
-        lost = f"{images.orphans} label images of {folder} belong to no image." if images.orphans else ""
+        images = ImagePairs(folder, _table(folder, how.classes_file), depth=how.depth)
+        lost = f"Label images of {folder} that belong to no image: {images.orphans}." if images.orphans else ""
         return _source(str(folder), images, images.classes, lost)
     if any(folder.glob("*.npz")):
         return _source(str(folder), PairFolder(folder), _plain(_table(folder, how.classes_file)))

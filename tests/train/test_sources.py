@@ -162,8 +162,9 @@ def _spoil(folder: Path, what: str) -> None:
     spoilt: dict[str, Callable[[], object]] = {
         "id": lambda: cv2.imwrite(label, np.full((8, 9), 7, np.uint8)),
         "label size": lambda: cv2.imwrite(label, np.ones((4, 9), np.uint8)),
-        "image size": lambda: cv2.imwrite(image, np.ones((4, 9, 3), np.uint8)),
         "image": lambda: Path(image).write_bytes(b"no image"),
+        "empty": lambda: Path(image).write_bytes(b""),
+        "turned": lambda: _turn(Path(image)),
         "table": (folder / "classes.json").unlink,
         "names": lambda: [path.rename(path.with_stem(f"x{path.stem}")) for path in (folder / "labels").iterdir()],
         "labels": lambda: shutil.rmtree(folder / "labels"),
@@ -172,9 +173,30 @@ def _spoil(folder: Path, what: str) -> None:
     spoilt[what]()
 
 
+def _turn(path: Path) -> None:
+    """Into a JPEG on its side."""
+    path.unlink()
+    jpeg = cv2.imencode(".jpg", np.ones((8, 9, 3), np.uint8))[1].tobytes()
+    tag = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
+    path.with_suffix(".jpg").write_bytes(jpeg[:2] + b"\xff\xe1" + (len(tag) + 2).to_bytes(2, "big") + tag + jpeg[2:])
+
+
+def test_images_of_unequal_sizes_stand_alone(tmp_path: Path) -> None:
+    """As frames of a log whose size changes; depth that the network does not take is not even looked at."""
+    folder = _image_folder(tmp_path / "data")
+    cv2.imwrite(str(folder / "images" / "1.png"), np.full((4, 9, 3), 7, np.uint8))
+    cv2.imwrite(str(folder / "labels" / "1.png"), np.zeros((4, 9), np.uint8))
+    (folder / "depth").mkdir()
+    (folder / "depth" / "1.png").write_bytes(b"no depth")
+    pairs = open_source([str(folder)], Reading(tmp_path / "cache")).pairs
+    seen = pairs.pair(0)
+    assert (seen.images.shape, np.unique(seen.images).tolist(), seen.labels.shape) == ((2, 4, 9, 3), [7], (2, 4, 9))
+
+
 @pytest.mark.parametrize(("what", "sentence"), [
     ("id", "1.png has 72 pixels with an id or colour that the class table of 2 classes does not have"),
-    ("label size", "1.png is 9x4, but"), ("image size", "1.png is 9x4, but"), ("image", "1.png cannot be used"),
+    ("label size", "1.png is 9x4, but"), ("image", "1.png cannot be used: it is neither png"),
+    ("empty", "1.png cannot be used: it is empty"), ("turned", "1.jpg has an EXIF tag that turns it"),
     ("table", "have no class table; give --classes FILE"), ("names", "but none of equal name"),
     ("labels", "holds no log"), ("two", "have one name"),
 ])  # fmt: skip
