@@ -26,6 +26,22 @@ def aside(target: Path, ending: str = "") -> Path:
     return target.with_name(f".{target.name}.{os.getpid()}{ending}")
 
 
+def write_aside(target: Path, data: bytes) -> None:
+    """Write a file whole or not at all: where it fails, what was there stays.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    unfinished = aside(target)
+    try:
+        unfinished.write_bytes(data)
+        unfinished.replace(target)
+    except BaseException:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+        raise
+
+
 def _left(target: Path) -> list[Path]:
     form = re.compile(re.escape(f".{target.name}.") + r"(\d{1,10})(\.db3(-wal|-journal|-shm)?)?", re.ASCII)
     try:

@@ -1,11 +1,14 @@
 """Names aside: this process's own, and what dead processes left behind for the same target is gone."""
 
+import errno
 import os
 import subprocess
 import sys
 from pathlib import Path
 
-from stsem.aside import aside
+import pytest
+
+from stsem.aside import aside, write_aside
 
 
 def dead_process() -> int:
@@ -45,3 +48,19 @@ def test_a_link_is_removed_and_not_what_it_leads_to(tmp_path: Path) -> None:
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     """Nothing to remove."""
     assert aside(tmp_path / "none/log").parent == tmp_path / "none"
+
+
+def test_a_file_that_cannot_be_written_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whole or not at all: a full disk costs neither the file that was there nor leaves a piece of the new one."""
+    path = tmp_path / "network.onnx"
+    write_aside(path, b"old")
+
+    def full(self: Path, data: bytes) -> int:
+        with self.open("wb") as file:
+            file.write(data[:1])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space"):
+        write_aside(path, b"new")
+    assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("network.onnx", b"old")]

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stsem import hostclock
-from stsem.aside import aside
+from stsem.aside import write_aside
 from stsem.cli.console import is_terminal, note
-from stsem.errors import OutputError
 from stsem.report.plots.training import training_curves
 from stsem.report.wording import plural
 from stsem.train.curves import read_csv
@@ -104,10 +103,7 @@ def _draw(folder: Path) -> None:
     if not rows:
         return
     path = folder / PICTURE
-    unfinished = aside(path)
     try:
-        unfinished.write_bytes(training_curves(rows))
-        unfinished.replace(path)
-    except OSError as err:
-        unfinished.unlink(missing_ok=True)
-        raise OutputError(f"The picture {path} cannot be written: {err.strerror or err}.") from err
+        write_aside(path, training_curves(rows))
+    except OSError as err:  # no reason to stop a training, nor to hide why it stopped
+        note(f"The picture {path} cannot be written: {err.strerror or err}.")

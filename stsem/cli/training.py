@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from stsem.classes import ClassSet
+from stsem.classes import NO_LABEL, ClassSet
 from stsem.cli.console import note, progress
 from stsem.cli.recordings import check_once, recordings
 from stsem.cli.stagebar import drawn, shown, stopping_in_order
@@ -96,7 +96,14 @@ def _read(wanted: Wanted, architecture: str) -> Read:
     pairs = join(sources, classes, class_map)
     note(f"{plural(len(pairs), 'pair')} of {plural(len(sources), 'data set')}, "
          f"{plural(len(classes), 'class')}.")  # fmt: skip
-    return Read(classes, pairs, join(others, classes, class_map) if others else None, sources[0].size)
+    validation = join(others, classes, class_map) if others else None
+    if validation is not None and not any(_has_truth(validation, index) for index in range(len(validation))):
+        raise UsageError("No pixel of the validation data has a label that is learned; validate with data with truth.")
+    return Read(classes, pairs, validation, sources[0].size)
+
+
+def _has_truth(pairs: Pairs, index: int) -> bool:
+    return bool((pairs.pair(index).labels != NO_LABEL).any())
 
 
 def _open_all(wanted: Wanted, given: Sequence[str], *, depth: bool) -> list[Source]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from stsem.aside import write_aside
 from stsem.errors import NetworkError, OutputError
 from stsem.models.foreign import (
     TYPES,
@@ -85,7 +86,7 @@ def adopt(
     model.graph.initializer.extend(nodes.constants)
     helper.set_model_props(model, dict(sorted(metadata.items())))
     try:
-        out.write_bytes(model.SerializeToString(deterministic=True))
+        write_aside(out, model.SerializeToString(deterministic=True))
     except OSError as err:
         raise OutputError(f"The network cannot be written to {out}: {err.strerror}.") from err
     except ValueError as err:

@@ -14,6 +14,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from stsem.aside import write_aside
 from stsem.errors import NetworkError, OutputError
 from stsem.models.folding import folded
 from stsem.models.montecarlo import MAPS, fix_masks, uncertainty
@@ -91,7 +92,7 @@ def export_onnx(
     _forget_origins(model)
     onnx.helper.set_model_props(model, dict(sorted(metadata.items())))
     try:
-        path.write_bytes(model.SerializeToString(deterministic=True))
+        write_aside(path, model.SerializeToString(deterministic=True))
     except OSError as err:
         raise OutputError(f"The network cannot be written to {path}: {err.strerror}.") from err
 

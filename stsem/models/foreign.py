@@ -141,8 +141,10 @@ def _input(
     shape = (channels, height, width) if found == "nchw" else (height, width, channels)
     full = (1, *shape)[-len(sides) :]
     if any(is_ is not None and is_ != want for is_, want in zip(sides, full, strict=True)):
+        many = len(sides) == 4 and sides[1:] == full[1:]
+        what = "export it for one image at a time" if many else "write the network's own size there"
         raise NetworkError(f"The input {shown(value.name)} has the shape {_shape(sides)}, but the sidecar's size calls "
-                           f"for {_shape(full)}; write the network's own size there.")  # fmt: skip
+                           f"for {_shape(full)}; {what}.")  # fmt: skip
     for side, number in zip(tensor.shape.dim, full, strict=True):
         side.dim_value = number
     return ForeignInput(role, value.name, tensor.elem_type, found, full)

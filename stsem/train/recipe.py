@@ -104,7 +104,7 @@ _LEAST = {
     "report_every": 1, "validate_every": 1, "rate": 0.0, "fused_rate": 0.0, "clip": 0.0, "average": 0.0, "warm_up": 0,
     "stretch": 0.0, "new_layers": 0.0, "balance": 0.0, "decay": 0.0, "momentum": 0.0, "power": 0.0, "still": 0.0,
 }  # fmt: skip
-_MOST = {"momentum": 1.0, "average": 1.0, "still": 1.0, "rate": 1e6, "fused_rate": 1e6}
+_MOST = {"momentum": 1.0, "average": 1.0, "still": 1.0, "rate": 1e300, "fused_rate": 1e300}
 
 PAPER = Recipe(
     name="paper", pretrained=True, iterations=20_000, batch=3, fused_iterations=20_000, fused_batch=1, crop=(521, 521),

@@ -1,5 +1,6 @@
 """One stage of a training, from its start, or from where it was stopped, to its finished checkpoint."""
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -23,6 +24,12 @@ from stsem.train.starts import begin
 CHECKPOINT, CURVES = "checkpoint.pt", "curves.csv"
 JUDGED = 100
 """Validation pairs while a training runs; at its end all of them."""
+
+
+_DIFFERENT = {"pairs": "the data differ", "starts": "the weights to begin with differ",
+              "inputs": "classes or forms of the inputs differ",
+              "machine": "device, workers or precision differ"}  # fmt: skip
+"""How it is said that a part of a stage's identity differs, where the values say nothing to people."""
 
 
 @dataclass(frozen=True)
@@ -130,10 +137,22 @@ def _identity(job: Job, pairs: Pairs) -> dict[str, Any]:
 def _matching(path: Path, identity: dict[str, Any]) -> dict[str, Any]:
     """The state in a checkpoint of the same training. Raises TrainingError."""
     state = read_checkpoint(path)
-    if other := [key for key, value in identity.items() if state.get(key) != value]:
-        raise TrainingError(f"The checkpoint {path} is of another training (its {', '.join(other)} differ); "
-                            "give the same again, or another folder.")  # fmt: skip
+    if other := [_difference(key, state.get(key), value) for key, value in identity.items() if state.get(key) != value]:
+        raise TrainingError(f"The checkpoint {path} is of another training: {'; '.join(other)}. "
+                            "Give the same again, or another folder.")  # fmt: skip
     return state
+
+
+def _difference(key: str, kept: Any, given: Any) -> str:
+    """Which of them differs, and how, where that can be told in few words."""
+    if key == "recipe" and isinstance(kept, str):
+        pairs = zip(_numbers(kept), _numbers(given), strict=False)
+        return "the recipe has " + ", ".join(f"{now}, not {was}" for was, now in pairs if was != now)
+    return _DIFFERENT.get(key, f"the {key} is {given}, not {kept}")
+
+
+def _numbers(recipe: str) -> list[str]:
+    return re.split(r", (?=[a-z])", recipe)
 
 
 def _judged(training: Training, job: Job, validation: Pairs, most: int | None) -> tuple[float, float]:

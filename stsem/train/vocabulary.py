@@ -26,6 +26,8 @@ def network_classes(data: ClassSet, class_map: ClassMap) -> ClassSet:
     for number, name in enumerate(_renamed(data, class_map)):
         if name and normalised(name) not in map(normalised, kept):
             kept[name] = number
+    if not kept:
+        raise ClassTableError("The class map leaves no class to learn; leave one its name.")
     return ClassSet(tuple(kept), tuple(data.colours[number] for number in kept.values()) if data.colours else ())
 
 

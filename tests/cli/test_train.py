@@ -92,7 +92,7 @@ def test_from_given_weights(cli: Cli, home: Path) -> None:
     assert "presumes weights" not in ran.err
     without = cli(*second)
     assert without.code == 1
-    assert "of another training (its starts differ)" in without.err
+    assert "of another training: the weights to begin with differ." in without.err
     assert "The recipe paper presumes weights that were trained elsewhere" in without.err
 
 
