@@ -98,7 +98,7 @@ def _read(wanted: Wanted, architecture: str) -> Read:
          f"{plural(len(classes), 'class')}.")  # fmt: skip
     validation = join(others, classes, class_map) if others else None
     if validation is not None and not any(_has_truth(validation, index) for index in range(len(validation))):
-        raise UsageError("No pixel of the validation data has a label that is learned; validate with data with truth.")
+        raise UsageError("No pixel of the validation data has a label that is learned; give data with truth.")
     return Read(classes, pairs, validation, sources[0].size)
 
 

@@ -1,5 +1,6 @@
 """`stsem train`, as typed: from a log to a network that is replayed."""
 
+import errno
 import os
 import re
 import signal
@@ -8,12 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 
-from stsem.cli import training
+from stsem.cli import stagebar, training
 from stsem.train.job import Job
 from stsem.train.machine import DEVICES, PRECISIONS
 from stsem.train.recipe import RECIPES
@@ -143,3 +146,27 @@ def test_a_stage_without_those_before_it_begins_at_random(cli: Cli, home: Path) 
     assert "begins with random weights" not in said["colour"]
     assert "The stage difference begins with random weights: --stages leaves out colour.\n" in said["difference"]
     assert "stage fused begins with random weights: --stages leaves out colour and difference.\n" in said["fused"]
+
+
+def test_validation_without_truth_is_refused(cli: Cli, home: Path) -> None:
+    """It would be judged as nothing, at the end of a long training."""
+    for kind, content in (("images", np.zeros((8, 9, 3), np.uint8)), ("labels", np.full((8, 9), 255, np.uint8))):
+        (home / "blank" / kind).mkdir(parents=True)
+        cv2.imwrite(str(home / "blank" / kind / "0.png"), content)
+    (home / "blank" / "classes.txt").write_text("wall\nfloor")
+    ran = cli("train", LOGS / "tiny-a.mcap", "--validation", home / "blank", "--out", "net", *SMALL)
+    assert ran.code == 2
+    assert "No pixel of the validation data has a label that is learned; give data with truth." in ran.err
+
+
+def test_a_picture_that_cannot_be_written_stops_nothing(cli: Cli, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor does it hide why a training stopped."""
+    monkeypatch.setattr(stagebar, "write_aside", _full)
+    ran = cli("train", LOGS / "tiny-a.mcap", "--architecture", "fcn-32s-w1", "--out", "net", "--size", "64x64", *SMALL)
+    assert ran.code == 0, ran.err
+    assert "curves.png cannot be written: No space left on device." in ran.err
+    assert (home / "net" / "fcn-32s-w1.onnx").exists()
+
+
+def _full(path: Path, data: bytes) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")

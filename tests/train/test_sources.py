@@ -259,6 +259,40 @@ def test_labels_beyond_the_class_table_are_not_lost_in_silence(tmp_path: Path) -
         join([source], source.classes, {}).pair(1)
 
 
+def test_data_of_equal_names_and_sizes_but_other_contents_are_told_apart(tmp_path: Path) -> None:
+    """Pairs rendered anew, and a label image painted over; a copy with other times stays the same."""
+    prints = [_written(tmp_path / name, seed).fingerprint for name, seed in (("a", 0), ("b", 1), ("c", 0))]
+    sizes = {(tmp_path / name / "0.npz").stat().st_size for name in "abc"}
+    assert (len(sizes), prints[0] == prints[2], prints[0] != prints[1]) == (1, True, True)
+    (tmp_path / "b" / "0.npz").write_bytes((tmp_path / "b" / "0.npz").read_bytes()[:-30])
+    with pytest.raises(TrainingError, match=r"0.npz cannot be read .*render it anew"):
+        _ = PairFolder(tmp_path / "b").fingerprint
+
+    folder = _write_images(tmp_path / "images", write_walk(tmp_path / "walk.mcap", frames=3))
+    image = next((folder / "labels").iterdir())
+    _paint(image, 0)
+    shutil.copytree(folder, tmp_path / "copy", copy_function=shutil.copyfile)
+    first, copied = (open_source([str(x)], Reading(tmp_path)).pairs.fingerprint for x in (folder, tmp_path / "copy"))
+    size = image.stat().st_size
+    _paint(image, 1)
+    painted = open_source([str(folder)], Reading(tmp_path)).pairs.fingerprint
+    assert (image.stat().st_size, first == copied, first != painted) == (size, True, True)
+
+
+def _paint(path: Path, label: int) -> None:
+    """One pixel, in a file that is not compressed."""
+    labels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert labels is not None
+    labels[0, 0] = label
+    cv2.imwrite(str(path), labels, [cv2.IMWRITE_PNG_COMPRESSION, 0])
+
+
+def _written(folder: Path, seed: int) -> PairFolder:
+    folder.mkdir()
+    save_pair(folder / "0.npz", pair(seed))
+    return PairFolder(folder)
+
+
 def test_frames_are_decoded_anew_for_other_channels_or_another_table(tmp_path: Path) -> None:
     """Two cameras of one log have its sum, its stamps and its number of frames; a table may give ids other names."""
     log, cache = write_walk(tmp_path / "walk.mcap", second_camera=True), tmp_path / "cache"
@@ -293,6 +327,12 @@ def test_class_maps() -> None:
         network_classes(OFFICE, {"sofa": "chair"})
     with pytest.raises(ClassTableError, match=r"first data does not have .*stool"):
         lookup(OFFICE, classes, {"wall": ""}, "b.mcap")
+
+
+def test_a_class_map_that_leaves_nothing() -> None:
+    """One sentence about the map, not about tables."""
+    with pytest.raises(ClassTableError, match="leaves no class to learn"):
+        network_classes(ClassSet(("floor", "wall")), {"floor": "", "wall": ""})
 
 
 def test_class_map_files(tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def test_weights_depend_on_the_seed_and_on_nothing_else(pairs: PairFolder, whole
 @pytest.mark.parametrize(("change", "what"), [
     ({"seed": 9}, "the seed is 9, not"),
     ({"recipe": short(SCRATCH, 9)}, r"the recipe has iterations 9, not iterations \d+"),
-    ({"recipe": replace(SCRATCH, crop=(41, 89), still=1.0)}, r"the recipe has crop \(41, 89\), not crop \(.*, still 1.0"),
+    ({"recipe": replace(SCRATCH, crop=(41, 89), still=1.0)}, r"the recipe has crop \(41, 89\), not crop .*, still 1.0"),
     ({"machine": Machine(workers=1)}, "device, workers or precision differ"),
     ({"architecture": "pspnet-r18-spatial-w2"}, "the architecture is pspnet-r18-spatial-w2, not"),
     ({"sidecar": replace(SIDECAR, mean=(0.4,) * 3)}, "classes or forms of the inputs differ"),
