@@ -3,6 +3,7 @@
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Protocol
@@ -73,10 +74,14 @@ class PairFolder:
         if not self._paths:
             raise TrainingError(f"There is no training pair {prefix}*.npz in {folder}; render or convert some first.")
 
-    @property
+    @cached_property
     def fingerprint(self) -> str:
-        """Of the files' names and sizes."""
-        return fingerprint(f"{path.name} {path.stat().st_size}" for path in self._paths)
+        """Of the files' names and the checksums of their arrays: pairs of one shape all have one size.
+
+        Raises:
+            TrainingError: a file is damaged.
+        """
+        return fingerprint(f"{path.name} {_checksums(path)}" for path in self._paths)
 
     def __len__(self) -> int:
         return len(self._paths)
@@ -88,9 +93,20 @@ class PairFolder:
             with path.open("rb") as file, np.load(file) as arrays:
                 return _pair({name: arrays[name] for name in arrays.files if name in _TYPES})
         except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as err:
-            raise TrainingError(
-                f"The training pair {path} cannot be read ({err}); remove it and render it anew."
-            ) from err
+            raise _unreadable(path, err) from err
+
+
+def _checksums(path: Path) -> list[tuple[str, int]]:
+    """Name and CRC-32 of each array, from the file's directory alone. Raises TrainingError."""
+    try:
+        with zipfile.ZipFile(path) as arrays:
+            return [(member.filename, member.CRC) for member in arrays.infolist()]
+    except (OSError, ValueError, zipfile.BadZipFile) as err:
+        raise _unreadable(path, err) from err
+
+
+def _unreadable(path: Path, err: Exception) -> TrainingError:
+    return TrainingError(f"The training pair {path} cannot be read ({err}); remove it and render it anew.")
 
 
 def _pair(arrays: Mapping[str, npt.NDArray[Any]]) -> Pair:

@@ -10,7 +10,9 @@ Images without labels are the predecessors of others. Where the size changes fro
 stands alone.
 """
 
+import zlib
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -65,11 +67,16 @@ class ImagePairs:
                                 "docs/train.md says.")  # fmt: skip
         _refuse_turned(self._images.values())
 
-    @property
+    @cached_property
     def fingerprint(self) -> str:
-        """Of the files' names and sizes, and the class table."""
+        """Of the files' names and contents, and the class table; every file is read once, which takes a second per GB
+        or what the disk takes. Their times tell less: copies have others.
+
+        Raises:
+            TrainingError: a file cannot be read.
+        """
         files = (path for kind in (self._images, self._labels, self._depths) for path in kind.values())
-        lines = [f"{path.relative_to(self._folder)} {path.stat().st_size}" for path in files]
+        lines = [f"{path.relative_to(self._folder)} {_checksum(path)}" for path in files]
         return fingerprint([*lines, *self._table.meaning])
 
     def __len__(self) -> int:
@@ -152,6 +159,14 @@ def _refuse_turned(images: Iterable[Path]) -> None:
             raise TrainingError(f"The image {path} has an EXIF tag that turns it for viewing, and its labels may be "
                                 "either way round; turn its pixels and drop the tag (mogrify -auto-orient), and look "
                                 "whether the labels fit.")  # fmt: skip
+
+
+def _checksum(path: Path) -> int:
+    """CRC-32 of a file. Raises TrainingError."""
+    try:
+        return zlib.crc32(path.read_bytes())
+    except OSError as err:
+        raise TrainingError(f"The image {path} cannot be used: {err.strerror or err}.") from err
 
 
 def _read(path: Path, convert: Callable[[CompressedImage], Any]) -> Any:
