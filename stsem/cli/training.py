@@ -27,7 +27,7 @@ from stsem.train.machine import machine
 from stsem.train.publish import load_checkpoint, publish
 from stsem.train.recipe import Recipe
 from stsem.train.sources import Reading, Source, classes_of, join, open_source
-from stsem.train.stages import train_stage
+from stsem.train.stages import CHECKPOINT, finished, train_stage
 from stsem.train.starts import given_weights
 
 MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
@@ -149,9 +149,9 @@ def _usual_size(recipe: Recipe, image: tuple[int, int]) -> tuple[int, int]:
 
 def _train(wanted: Wanted, job: Job, read: Read, stages: Sequence[tuple[Stage, str]]) -> Path:
     """The checkpoint of the last stage."""
-    done: dict[str, Path] = {}
+    done = _done_before(wanted, job, [stage for stage, _ in stages])
     for stage, architecture in stages:
-        starts = _starts(wanted, stage, architecture, done, dict(stages))
+        starts = _starts(wanted, stage, architecture, done)
         this = replace(job, architecture=architecture, stage=stage, starts=starts)
         if "weights" in starts:
             network = build(architecture, len(read.classes))
@@ -165,14 +165,25 @@ def _train(wanted: Wanted, job: Job, read: Read, stages: Sequence[tuple[Stage, s
     return done[stages[-1][0]]
 
 
-def _starts(
-    wanted: Wanted, stage: Stage, architecture: str, done: dict[str, Path], names: dict[Stage, str]
-) -> dict[str, Path]:
+def _done_before(wanted: Wanted, job: Job, stages: Sequence[Stage]) -> dict[str, Path]:
+    """The colour stream that an earlier command finished in this folder, where a difference stream is to be trained."""
+    known = dict(stages_of(wanted.architecture))
+    if "difference" not in stages or "colour" in stages or "colour" not in known:
+        return {}
+    weights = {} if wanted.weights is None else {"weights": wanted.weights}
+    colour = finished(replace(job, architecture=known["colour"], stage="colour", starts=weights), wanted.out / "colour")
+    if colour is None:
+        return {}
+    note(f"The colour stream is the finished one in {colour}.")
+    return {"colour": colour}
+
+
+def _starts(wanted: Wanted, stage: Stage, architecture: str, done: dict[str, Path]) -> dict[str, Path]:
     """What a stage begins with: the stages before it, else the weights that were given."""
     if stage == "fused" and {"colour", "difference"} <= done.keys():
         return dict(done)
     if stage == "difference" and "colour" in done:
-        if names["colour"].replace("-spatial", "-temporal") == architecture:
+        if dict(stages_of(wanted.architecture))["colour"].replace("-spatial", "-temporal") == architecture:
             return dict(done)
         note("The difference stream has another width than the colour stream, so it begins with random weights.")
         return {}
@@ -180,7 +191,9 @@ def _starts(
         return {"weights": wanted.weights}
     known = [name for name, _ in stages_of(wanted.architecture)]
     if before := known[: known.index(stage)]:
-        note(f"The stage {stage} begins with random weights: --stages leaves out {' and '.join(before)}.")
+        there = [name for name in before if (wanted.out / name / CHECKPOINT).exists()]
+        but = f", and what {wanted.out} has of it is not finished, or of another training" if there else ""
+        note(f"The stage {stage} begins with random weights: --stages leaves out {' and '.join(before)}{but}.")
     return {}
 
 

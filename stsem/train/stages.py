@@ -88,6 +88,27 @@ def train_stage(
     return path
 
 
+def finished(job: Job, folder: Path) -> Path | None:
+    """The checkpoint of a stage that was trained to its end, on any machine, from any data; None without such a one.
+
+    Args:
+        job: the stage; where it has starts, it must have begun with them.
+        folder: as of `train_stage`.
+
+    Raises:
+        TrainingError: the checkpoint there is damaged, or a start cannot be read.
+    """
+    path = folder / CHECKPOINT
+    if not path.exists():
+        return None
+    state, wanted = read_checkpoint(path), job.identity()
+    del wanted["machine"]
+    if job.starts:
+        wanted["starts"] = _sums(job)
+    wanted["iteration"] = job.numbers.iterations
+    return path if all(state.get(key) == value for key, value in wanted.items()) else None
+
+
 def _run(
     training: Training, job: Job, pairs: Pairs, validation: Pairs | None, path: Path, identity: dict[str, Any],
     report: Callable[[Progress], None], stopping: Callable[[], bool],
@@ -130,8 +151,11 @@ def _training(job: Job, pairs: Pairs, state: dict[str, Any] | None) -> Training:
 
 
 def _identity(job: Job, pairs: Pairs) -> dict[str, Any]:
-    starts = {name: file_sha256(path) for name, path in sorted(job.starts.items())}
-    return {"format": FORMAT, **job.identity(), "pairs": pairs.fingerprint, "starts": starts}
+    return {"format": FORMAT, **job.identity(), "pairs": pairs.fingerprint, "starts": _sums(job)}
+
+
+def _sums(job: Job) -> dict[str, str]:
+    return {name: file_sha256(path) for name, path in sorted(job.starts.items())}
 
 
 def _matching(path: Path, identity: dict[str, Any]) -> dict[str, Any]:

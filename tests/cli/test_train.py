@@ -17,6 +17,7 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 
 from stsem.cli import stagebar, training
+from stsem.train.checkpoint import file_sha256, read_checkpoint
 from stsem.train.job import Job
 from stsem.train.machine import DEVICES, PRECISIONS
 from stsem.train.recipe import RECIPES
@@ -146,6 +147,22 @@ def test_a_stage_without_those_before_it_begins_at_random(cli: Cli, home: Path) 
     assert "begins with random weights" not in said["colour"]
     assert "The stage difference begins with random weights: --stages leaves out colour.\n" in said["difference"]
     assert "stage fused begins with random weights: --stages leaves out colour and difference.\n" in said["fused"]
+
+
+def test_a_stage_goes_on_from_the_one_that_an_earlier_command_finished(cli: Cli, home: Path) -> None:
+    """Colour, then difference, which starts from it; a colour stream of other numbers is not taken."""
+    common = ("train", LOGS / "tiny-a.mcap", "--architecture", "pspnet-r18-w1", "--size", "41x41", "--out", "net")
+    assert cli(*common, *SMALL, "--stages", "colour").code == 0
+    other = cli(*common, *SMALL, "--stages", "difference", "--batch", "1")
+    assert (
+        "The stage difference begins with random weights: --stages leaves out colour, and what net has of it is not "
+        "finished, or of another training.\n" in other.err
+    )
+    after = cli(*common, *SMALL, "--stages", "difference")
+    assert (after.code, "random weights" in after.err) == (0, False), after.err
+    assert "The colour stream is the finished one in net/colour/checkpoint.pt.\n" in after.err
+    colour, difference = (home / "net" / stage / "checkpoint.pt" for stage in ("colour", "difference"))
+    assert read_checkpoint(difference)["starts"] == {"colour": file_sha256(colour)}
 
 
 def test_validation_without_truth_is_refused(cli: Cli, home: Path) -> None:
