@@ -81,7 +81,7 @@ def adopt(
     model.graph.input.extend(_tensor(x.role, TensorProto.FLOAT, (1, inputs[x.role], height, width)) for x in taken)
     model.graph.output.extend(
         _tensor(name, kind, (1, height, width))
-        for name, kind in (("labels", TensorProto.UINT8), ("confidence", TensorProto.FLOAT))
+        for name, kind in (("labels", nodes.label_type), ("confidence", TensorProto.FLOAT))
     )
     model.graph.initializer.extend(nodes.constants)
     helper.set_model_props(model, dict(sorted(metadata.items())))
@@ -100,6 +100,7 @@ class _Nodes:
     def __init__(self) -> None:
         self.made: list[onnx.NodeProto] = []
         self.constants: list[onnx.TensorProto] = []
+        self.label_type: int = TensorProto.UINT8
 
     def add(self, kind: str, *inputs: str, output: str = "", **attributes: Any) -> str:
         """The name of the new node's output."""
@@ -136,7 +137,11 @@ class _Nodes:
         return self._from_scores(given, classes, size, layout, kind)
 
     def _from_labels(self, given: ForeignOutput, size: tuple[int, int], kind: str) -> str:
-        """Ids of any whole type; -1 becomes 255, no label. There is no confidence, so it is 1 everywhere."""
+        """Ids of any whole type; -1 becomes 255, no label. There is no confidence, so it is 1 everywhere.
+
+        Wide ids stay wide, since in 8 bits 256 would be class 0: whoever runs the network refuses those beyond the
+        classes.
+        """
         shape = given.value.shape
         grid = shape[1:3] if len(shape) == 4 and shape[-1] == 1 else shape[-2:]
         if len(shape) < 2 or given.value.size != grid[0] * grid[1]:
@@ -144,8 +149,7 @@ class _Nodes:
         name = self.add("Reshape", given.name, self.constant([1, 1, *grid]))
         if grid != size[::-1]:
             name = self._enlarged(self.add("Cast", name, to=TensorProto.FLOAT), size, "nearest")
-        wide = self.add("Cast", name, to=TensorProto.INT64, output="adopted/ids")
-        self._labels(wide, size)
+        self._labels(name, size, TensorProto.UINT8 if given.value.dtype == np.uint8 else TensorProto.INT64)
         one = numpy_helper.from_array(np.ones(1, np.float32))
         self.add("ConstantOfShape", self.constant([1, size[1], size[0]]), output="confidence", value=one)
         return f"{kind}: labels; their confidence is not known and stands as 1"
@@ -168,15 +172,16 @@ class _Nodes:
         if grid != size[::-1]:
             name = self._enlarged(name, size, "linear", classes)
         ids = self.add("ArgMax", name, axis=1, keepdims=1)
-        self._labels(ids, size)
+        self._labels(ids, size, TensorProto.UINT8)
         most = self.add("GatherElements", name, ids, axis=1)
         self.add("Reshape", most, self.constant([1, size[1], size[0]]), output="confidence")
         what = "probabilities" if is_probability else "scores, softmax added"
         return f"{kind}: {what}{'' if grid == size[::-1] else ', enlarged'}"
 
-    def _labels(self, ids: str, size: tuple[int, int]) -> None:
-        narrow = self.add("Cast", ids, to=TensorProto.UINT8)
-        self.add("Reshape", narrow, self.constant([1, size[1], size[0]]), output="labels")
+    def _labels(self, ids: str, size: tuple[int, int], kind: int) -> None:
+        self.label_type = kind
+        cast = self.add("Cast", ids, to=kind, output="adopted/ids")
+        self.add("Reshape", cast, self.constant([1, size[1], size[0]]), output="labels")
 
     def _enlarged(self, name: str, size: tuple[int, int], mode: str, channels: int = 1) -> str:
         """At (width, height), the centres of pixels aligned, as torch does without `align_corners`."""

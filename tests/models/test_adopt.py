@@ -13,7 +13,12 @@ onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 
 from onnx import TensorProto, helper, numpy_helper
 
+from stsem.classes import NO_LABEL, ClassSet
 from stsem.errors import NetworkError
+from stsem.frame import Frame
+from stsem.inference.inferencer import Inferencer
+from stsem.inference.network import load_network
+from stsem.inference.sidecar import Sidecar, render
 from stsem.models.adopt import Told, adopt
 
 WIDTH, HEIGHT, CLASSES = 24, 16, 5
@@ -80,7 +85,7 @@ def run(path: Path, scale: float = 1) -> tuple[np.ndarray, np.ndarray]:
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     labels, confidence = session.run(["labels", "confidence"], {"image": image() * np.float32(scale)})
     assert labels.shape == confidence.shape == (1, HEIGHT, WIDTH)
-    assert (labels.dtype, confidence.dtype) == (np.uint8, np.float32)
+    assert (labels.dtype in (np.uint8, np.int64), confidence.dtype) == (True, np.float32)
     return labels[0], confidence[0]
 
 
@@ -161,6 +166,28 @@ def test_labels_of_any_whole_type(tmp_path: Path, kept: int, kind: int) -> None:
     assert np.array_equal(labels, probabilities().argmax(0))
     assert (confidence == 1).all()
     assert "labels; their confidence is not known" in found[-1]
+
+
+@pytest.mark.parametrize(("kind", "offset"), [(TensorProto.INT64, 256), (TensorProto.INT32, 512),
+                                              (TensorProto.UINT8, 100), (TensorProto.INT16, -9)])  # fmt: skip
+def test_ids_beyond_the_classes_are_refused(tmp_path: Path, kind: int, offset: int) -> None:
+    """In 8 bits 256 would be class 0; below 0 is no label, whatever the number."""
+    last = (("ArgMax", {"axis": 1, "keepdims": 0}), ("Cast", {"to": kind}))
+    path = foreign(tmp_path / "net.onnx", last=last, out=(kind, (1, HEIGHT, WIDTH)))
+    model = onnx.load(path)
+    model.graph.node[-1].CopyFrom(helper.make_node("Add", [model.graph.node[-1].input[0], "offset"], ["labels"]))
+    model.graph.initializer.append(helper.make_tensor("offset", kind, [], [offset]))
+    onnx.save(model, path)
+    out, _ = adopted(path)
+    sidecar = Sidecar(SIZE, (0.0,) * 3, (1.0,) * 3, ClassSet(tuple("abcde")))
+    out.with_suffix(".toml").write_text(render(sidecar))
+    seen = Frame(0, 0, np.full((HEIGHT, WIDTH, 3), 99, np.uint8))
+    network = Inferencer(load_network(out), threads=1)
+    if offset < 0:
+        assert (network.infer(seen).labels == NO_LABEL).all()
+    else:
+        with pytest.raises(NetworkError, match=rf"returned class {offset // 10}\d, but its sidecar names 5 classes"):
+            network.infer(seen)
 
 
 def test_small_labels_are_enlarged_by_the_nearest(tmp_path: Path) -> None:
