@@ -14,8 +14,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from stsem.aside import write_aside
-from stsem.errors import NetworkError, OutputError
+from stsem.errors import NetworkError
 from stsem.models.folding import folded
 from stsem.models.montecarlo import MAPS, fix_masks, uncertainty
 from stsem.models.network import CHANNELS, SegmentationNetwork
@@ -60,21 +59,19 @@ def input_names(network: SegmentationNetwork) -> list[str]:
     return ["image", *(name for name in network.inputs if name != "image")]
 
 
-def export_onnx(
-    network: SegmentationNetwork, path: Path, *, size: tuple[int, int], metadata: Mapping[str, str], passes: int = 0
-) -> None:
-    """Write `network` for inputs of `size` to `path`, one file; same weights and versions, same bytes.
+def exported(
+    network: SegmentationNetwork, *, size: tuple[int, int], metadata: Mapping[str, str], passes: int = 0
+) -> bytes:
+    """`network` for inputs of `size` as an ONNX file; same weights and versions, same bytes.
 
     Args:
         network: put into evaluation mode here.
-        path: the ONNX file; its folder must exist.
         size: (width, height).
         metadata: strings to keep in the file.
         passes: of Monte Carlo dropout with masks that become constants of the graph; it then also gives `MAPS`.
 
     Raises:
         NetworkError: the size does not fit the network, or it has no dropout to sample.
-        OutputError: the file cannot be written.
     """
     _check_size(network, size)
     names = input_names(network.eval())
@@ -87,14 +84,11 @@ def export_onnx(
             verbose=False, input_names=names, output_names=["labels", "confidence", *(MAPS if passes else ())],
         )  # fmt: skip
     if program is None:
-        raise NetworkError(f"torch could not export the network to {path}.")
+        raise NetworkError("torch could not export the network.")
     model = program.model_proto
     _forget_origins(model)
     onnx.helper.set_model_props(model, dict(sorted(metadata.items())))
-    try:
-        write_aside(path, model.SerializeToString(deterministic=True))
-    except OSError as err:
-        raise OutputError(f"The network cannot be written to {path}: {err.strerror}.") from err
+    return bytes(model.SerializeToString(deterministic=True))
 
 
 def answer_of(network: SegmentationNetwork, size: tuple[int, int], passes: int = 0) -> Answer:

@@ -1,17 +1,20 @@
 """A checkpoint -> the two files that a user runs: ONNX and sidecar, checked against torch."""
 
-from contextlib import suppress
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from stsem import chance
+from stsem.aside import aside
 from stsem.errors import NetworkError, OutputError
 from stsem.inference.network import CLASS_COUNT, Network, load_network
 from stsem.inference.preprocess import network_inputs
 from stsem.inference.sidecar import Sidecar, parse, render
-from stsem.models.export import Agreement, agreement, export_onnx
+from stsem.models.export import Agreement, agreement, exported
 from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
 from stsem.train.checkpoint import averaged_weights, read_checkpoint
@@ -34,7 +37,9 @@ def load_checkpoint(path: Path, classes: int) -> SegmentationNetwork:
 
 
 def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passes: int = 0) -> Network:
-    """Write `path` (.onnx) and its sidecar (.toml) for inputs of `sidecar.size`, and check them.
+    """Write `path` (.onnx) and its sidecar (.toml) for inputs of `sidecar.size`, once they are checked.
+
+    What is there already is replaced by both, or stays where anything fails.
 
     The sidecar written has the sections that the network has inputs for (`Sidecar.for_inputs`). With `passes` of Monte
     Carlo dropout the graph also gives the maps of uncertainty.
@@ -52,27 +57,44 @@ def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passe
         raise NetworkError(
             "The network takes the image difference, but its sidecar has no section [difference]; add one with a scale."
         )
-    export_onnx(network, path, size=sidecar.size, metadata={CLASS_COUNT: str(len(sidecar.classes))}, passes=passes)
-    _write_beside(path, described)
-    published = load_network(path)
-    found = _agreement_on_noise(network, published, passes)
-    if not found.holds:
-        raise NetworkError(
-            f"The exported network {path} does not answer as torch does: equal are {found}; do not use it."
-        )
-    return published
+    with _trial_folder(path) as trial:
+        metadata = {CLASS_COUNT: str(len(sidecar.classes))}
+        (trial / path.name).write_bytes(exported(network, size=sidecar.size, metadata=metadata, passes=passes))
+        (trial / path.name).with_suffix(".toml").write_text(render(described), encoding="utf-8")
+        found = _agreement_on_noise(network, load_network(trial / path.name), passes)
+        if not found.holds:
+            raise NetworkError(
+                f"The network as exported does not answer as torch does: equal are {found}; {path} was not written."
+            )
+        _replace(path, trial, described)
+    return load_network(path)
 
 
-def _write_beside(path: Path, sidecar: Sidecar) -> None:
-    """The sidecar of `path`; one that says the same already stays, with its comments. Raises OutputError."""
-    beside = path.with_suffix(".toml")
+@contextmanager
+def _trial_folder(path: Path) -> Iterator[Path]:
+    """A folder beside `path` while both files are made and checked. Raises OutputError for an OSError inside."""
+    trial = aside(path)
     try:
-        with suppress(FileNotFoundError, UnicodeDecodeError, NetworkError):
-            if parse(beside.read_text(encoding="utf-8"), str(beside)) == sidecar:
-                return
-        beside.write_text(render(sidecar), encoding="utf-8")
+        trial.mkdir()
+        yield trial
     except OSError as err:
-        raise OutputError(f"The sidecar of {path} cannot be written: {err.strerror}.") from err
+        raise OutputError(f"The network cannot be written to {path}: {err.strerror}.") from err
+    finally:
+        shutil.rmtree(trial, ignore_errors=True)
+
+
+def _replace(path: Path, trial: Path, sidecar: Sidecar) -> None:
+    """Move both files into place; a sidecar that says the same already stays, with its comments."""
+    beside = path.with_suffix(".toml")
+    if not _says(beside, sidecar):
+        (trial / beside.name).replace(beside)
+    (trial / path.name).replace(path)
+
+
+def _says(beside: Path, sidecar: Sidecar) -> bool:
+    with suppress(FileNotFoundError, UnicodeDecodeError, NetworkError):
+        return parse(beside.read_text(encoding="utf-8"), str(beside)) == sidecar
+    return False
 
 
 def _agreement_on_noise(network: SegmentationNetwork, published: Network, passes: int) -> Agreement:

@@ -1,5 +1,7 @@
 """`stsem export`, as typed."""
 
+import errno
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -17,7 +19,9 @@ from stsem.frame import Frame
 from stsem.inference.inferencer import Inferencer
 from stsem.inference.network import load_network
 from stsem.inference.sidecar import DepthForm, Difference, Sidecar, render
+from stsem.models.export import Agreement
 from stsem.models.zoo import ZOO, build
+from stsem.train import publish
 
 from .conftest import Cli
 
@@ -60,6 +64,35 @@ def test_the_sidecar_follows_the_inputs(cli: Cli, sidecar: Path, tmp_path: Path)
     assert ran.code == 1
     assert "its sidecar has no section [difference]" in ran.sentence
     assert not (tmp_path / "other.onnx").exists()
+
+
+def test_a_failed_export_leaves_what_was_there(
+    cli: Cli, sidecar: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether the graph disagrees with torch or the disk fills up on the way; then both files are replaced."""
+    folder = tmp_path / "nets"
+    folder.mkdir()
+    out, beside = folder / "net.onnx", folder / "net.toml"
+    out.write_bytes(b"a good network")
+    beside.write_text("# its sidecar")
+    arguments = ("export", out, "--sidecar", sidecar, "--architecture", "fcn-32s-w1")
+    with monkeypatch.context() as patch:
+        patch.setattr(publish, "agreement", lambda *_: Agreement(0.5, 0.1))
+        ran = cli(*arguments)
+        assert (ran.code, ran.err.count("\n")) == (1, 1)
+        assert "does not answer as torch does: equal are 50.0000% of the labels" in ran.err
+        patch.setattr(publish, "render", _full_disk)
+        ran = cli(*arguments)
+        assert ran.err == f"stsem: The network cannot be written to {out}: No space left on device.\n"
+    assert (out.read_bytes(), beside.read_text()) == (b"a good network", "# its sidecar")
+    assert sorted(folder.iterdir()) == [out, beside]
+    assert cli(*arguments).code == 0
+    assert load_network(out).classes == SIDECAR.classes
+    assert sorted(folder.iterdir()) == [out, beside]
+
+
+def _full_disk(_: object) -> str:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def test_a_sidecar_of_the_users_own_stays(cli: Cli, tmp_path: Path) -> None:

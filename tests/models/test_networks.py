@@ -12,7 +12,7 @@ onnx = pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 
 from stsem.errors import NetworkError
 from stsem.models.cost import cost, cost_of
-from stsem.models.export import Answer, export_onnx
+from stsem.models.export import Answer, exported
 from stsem.models.folding import folded
 from stsem.models.montecarlo import fix_masks, uncertainty
 from stsem.models.network import SegmentationNetwork, softmax
@@ -213,7 +213,7 @@ def test_the_exported_graph_is_the_network(tmp_path: Path) -> None:
     every bit of both outputs alike."""
     torch.manual_seed(1)
     network, path = OneStream(TINY, 13), tmp_path / "net.onnx"
-    export_onnx(network, path, size=SIZE, metadata={"b": "2", "a": "1"})
+    path.write_bytes(exported(network, size=SIZE, metadata={"b": "2", "a": "1"}))
     model = onnx.load(path)
     assert {prop.key: prop.value for prop in model.metadata_props} == {"a": "1", "b": "2"}
     kinds = {node.op_type for node in model.graph.node}
@@ -222,7 +222,7 @@ def test_the_exported_graph_is_the_network(tmp_path: Path) -> None:
     data = path.read_bytes()
     assert __file__.encode() not in data
     assert b"site-packages" not in data
-    export_onnx(network, path, size=SIZE, metadata={"b": "2", "a": "1"})
+    path.write_bytes(exported(network, size=SIZE, metadata={"b": "2", "a": "1"}))
     assert hashlib.sha256(path.read_bytes()).digest() == hashlib.sha256(data).digest()
     assert len({_answered(path, threads) for threads in (1, 2, 2)}) == 1
 
@@ -265,7 +265,7 @@ def test_folding_changes_no_answer() -> None:
 def test_a_size_that_does_not_fit_names_the_nearest() -> None:
     """270 is not 48 k - 7; 281 is."""
     with pytest.raises(NetworkError, match="270 is not 48 k - 7; use 281"):
-        export_onnx(OneStream(TINY, 3), Path("never.onnx"), size=(473, 270), metadata={})
+        exported(OneStream(TINY, 3), size=(473, 270), metadata={})
 
 
 def test_checkpoints_made_so_far_load() -> None:
