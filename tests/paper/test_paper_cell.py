@@ -4,6 +4,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,12 +16,14 @@ from bench.paper.data import Data
 from bench.paper.facts import facts_of
 from bench.paper.plan import find_cell
 from bench.paper.problem import Place
+from stsem import hostclock
 from stsem.classes import ClassSet
 from stsem.errors import TrainingError
 from stsem.metrics.scores import scores
 from stsem.train.dataset import Pair, save_pair
 from stsem.train.judge import judge
 from stsem.train.publish import load_checkpoint
+from stsem.train.stages import Progress, train_stage
 
 pytestmark = pytest.mark.torch
 
@@ -73,6 +76,31 @@ def test_streams_and_what_is_made_of_them(data: Data, tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(cells, "train_stage", train_again)
     assert _run(data, tmp_path, *keys)[-1] == wrong
+
+
+def test_the_time_of_all_processes_is_summed(data: Data, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One is stopped at its first report after 5 s, the next takes 7 s: by a clock that only the test moves."""
+    clock, cell = [100 * 10**9], find_cell("spatial-first/0")
+    monkeypatch.setattr(hostclock, "process_cpu_ns", lambda: clock[0])
+
+    def stopped(*arguments: Any) -> Path:
+        clock[0] += 5 * 10**9
+        arguments[4](Progress("colour", 1, 2, 0.0, 0.0, None))
+        raise TrainingError("stopped")
+
+    def trained(*arguments: Any) -> Path:
+        clock[0] += 7 * 10**9
+        return train_stage(*arguments)
+
+    facts = facts_of(data, tmp_path)
+    monkeypatch.setattr(cells, "train_stage", stopped)
+    with pytest.raises(TrainingError, match="stopped"):
+        cells.run_cell(cell, data, facts, tmp_path, lambda _: None)
+    clock[0] = 3 * 10**9  # another process
+    monkeypatch.setattr(cells, "train_stage", trained)
+    cells.run_cell(cell, data, facts, tmp_path, lambda _: None)
+    result = json.loads(cells.result_path(tmp_path, data.name, cell).read_text())
+    assert result["host"]["training_cpu_s_all_processes"] == 12
 
 
 def test_results_of_another_training_are_refused(data: Data, tmp_path: Path) -> None:
