@@ -10,8 +10,8 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 demo: $(VENV)/.demo-ready        ## replay the log that ships with the project, both ways, and compare
 	$(BIN)/stsem-replay logs/office.mcap --costs bench/costs/reference.json
 
-test: $(VENV)/.test-ready        ## the whole suite
-	$(BIN)/python -m pytest
+test: $(VENV)/.test-ready        ## the whole suite, in two processes; each file's tests in one of them
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 check: $(VENV)/.test-ready       ## lint, format, types, import contract
 	$(BIN)/ruff check .

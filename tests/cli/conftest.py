@@ -53,6 +53,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     monkeypatch.chdir(folder)
     monkeypatch.setenv("STSEM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("COLUMNS", "120")  # what is printed does not depend on the terminal that the tests run in
     return folder
 
 
