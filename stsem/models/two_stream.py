@@ -187,7 +187,7 @@ def copy_colour_to_difference(
 
 
 def adapt_to_difference(stream: PSPNet, *, std: tuple[float, float, float], scale: float) -> None:
-    """Make a stream that has a colour stream's weights one for differences, in place; see `copy_colour_to_difference`."""
+    """Make a stream with a colour stream's weights one for differences, in place; see `copy_colour_to_difference`."""
     stem = stream.backbone.stem
     with torch.no_grad():
         stem.get_parameter("0.weight").div_(torch.tensor(std).reshape(1, 3, 1, 1) * scale)
