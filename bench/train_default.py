@@ -2,13 +2,16 @@
 
 python bench/train_default.py publish --checkpoint .scratch/a/fused/checkpoint.pt --size 713 425 --passes 4 --out a.onnx
 python bench/train_default.py judge   --network default --pairs .scratch/validation
-python bench/train_default.py judge   --network default --log logs/office.mcap
+python bench/train_default.py judge   --network default --log logs/office.mcap --reduced 240 135
+python bench/train_default.py passes  --networks with.onnx without.onnx --log logs/office.mcap
 """
 
 import argparse
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 from torch.nn.functional import interpolate
@@ -59,7 +62,17 @@ def _of_log(path: Path) -> Iterator[Sample]:
 
 
 def _samples(args: argparse.Namespace) -> Iterator[Sample]:
-    return _of_log(args.log) if args.log else _of_pairs(args.pairs, args.prefix)
+    samples = _of_log(args.log) if args.log else _of_pairs(args.pairs, args.prefix)
+    return (_reduced(sample, tuple(args.reduced)) for sample in samples) if args.reduced else samples
+
+
+def _reduced(sample: Sample, size: tuple[int, int]) -> Sample:
+    """As a smaller camera would see it: the mean of the pixels that it merges, and the label of the middle one."""
+    image, previous, truth = sample
+    small, before = (None if x is None else np.asarray(cv2.resize(x, size, interpolation=cv2.INTER_AREA), np.uint8)
+                     for x in (image, previous))  # fmt: skip
+    assert small is not None
+    return small, before, labels_at(truth, size)
 
 
 def _show(name: str, matrix: ConfusionMatrix) -> None:
@@ -80,6 +93,20 @@ def _judge(args: argparse.Namespace) -> None:
         spent.append(hostclock.wall_ns() - begun)
         matrix.update(truth, segmentation(output, (image.shape[1], image.shape[0])).labels)
     _show(f"{args.network}, {len(spent)} frames, median {np.median(spent) / 1e6:.0f} ms", matrix)
+
+
+def _passes(args: argparse.Namespace) -> None:
+    """What a pass through each graph takes on one thread, in turn on the same frames: the medians may be compared."""
+    set_threads(1)
+    runs = {path: Inferencer(load_network(path), threads=1) for path in args.networks}
+    spent: dict[str, list[int]] = {path: [] for path in runs}
+    for number, (image, previous, _) in enumerate(_samples(args)):
+        for path, inferencer in runs.items():
+            begun = time.process_time_ns()
+            inferencer.compute(Frame(number, 0, image, previous))
+            spent[path].append(time.process_time_ns() - begun)
+    for path, samples in spent.items():
+        print(f"{path}: median {np.median(samples) / 1e6:.1f} ms of CPU time, {len(samples)} frames")
 
 
 def _streams(args: argparse.Namespace) -> None:
@@ -117,11 +144,15 @@ def _arguments() -> argparse.Namespace:
     streams = verbs.add_parser("streams")
     streams.set_defaults(run=_streams)
     streams.add_argument("--size", type=int, nargs=2, default=(473, 281))
-    for verb in (judge, streams):
+    passes = verbs.add_parser("passes")
+    passes.set_defaults(run=_passes)
+    passes.add_argument("--networks", nargs="+", required=True)
+    for verb in (judge, streams, passes):
         verb.add_argument("--log", type=Path)
+        verb.add_argument("--reduced", type=int, nargs=2, help="width and height to reduce images and truth to")
     for verb in (export, streams):
         verb.add_argument("--checkpoint", type=Path, required=True)
-    for verb in (judge, streams):
+    for verb in (judge, streams, passes):
         verb.add_argument("--pairs", type=Path)
         verb.add_argument("--prefix", default="")
         verb.add_argument("--threads", type=int, default=2)
