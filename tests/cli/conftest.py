@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer import rich_utils
 
 from stsem.cli import main
 
@@ -44,6 +45,13 @@ def report(folder: Path | str) -> dict[str, Any]:
 def rows(folder: Path | str) -> list[dict[str, str]]:
     """frames.csv."""
     return list(csv.DictReader(io.StringIO((Path(folder) / "frames.csv").read_text())))
+
+
+@pytest.fixture
+def wide_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal wide enough for no line to be broken, without colours."""
+    monkeypatch.setattr(rich_utils, "MAX_WIDTH", 400)  # typer reads TERMINAL_WIDTH once, on import
+    monkeypatch.setenv("NO_COLOR", "1")
 
 
 @pytest.fixture

@@ -21,11 +21,8 @@ CHOICES = {
 
 
 @pytest.fixture
-def help_text(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
-    """`stsem-replay --help` on a terminal wide enough for no line to be broken, as plain text."""
-    monkeypatch.setenv("COLUMNS", "400")
-    monkeypatch.setenv("TERMINAL_WIDTH", "400")
-    monkeypatch.setenv("NO_COLOR", "1")
+def help_text(wide_terminal: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
+    """`stsem-replay --help` as plain text."""
     monkeypatch.setattr(sys, "argv", ["stsem-replay", "--help"])
     with pytest.raises(SystemExit) as end:
         main.stsem_replay()
@@ -43,11 +40,9 @@ def test_every_choice_is_named_beside_its_option(help_text: str, option: str) ->
 
 @pytest.mark.parametrize(("option", "default"), [("--out", "[training]"), ("--recipe", "[scratch]"), ("--seed", "[0]")])
 def test_defaults_in_square_brackets_are_shown(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], option: str, default: str
+    wide_terminal: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], option: str, default: str
 ) -> None:
     """They are no markup."""
-    monkeypatch.setenv("TERMINAL_WIDTH", "400")
-    monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.setattr(sys, "argv", ["stsem", "train", "--help"])
     with pytest.raises(SystemExit):
         main.stsem()

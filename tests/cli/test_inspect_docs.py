@@ -45,8 +45,7 @@ def test_the_shared_logs(cli: Cli, shared_logs: Path, monkeypatch: pytest.Monkey
     assert cli("inspect", name).out == shown()[name]
 
 
-def test_flags_that_findings_name_exist(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "200")
+def test_flags_that_findings_name_exist(cli: Cli, wide_terminal: None) -> None:
     known = set(re.findall(r"--[a-z-]+", cli("replay", "--help").out + cli("convert", "--help").out))
     named = {flag for check in CHECKS for flag in re.findall(r"--[a-z-]+", check.do)}
     assert named

@@ -100,10 +100,8 @@ def test_from_given_weights(cli: Cli, home: Path) -> None:
     assert "The recipe paper presumes weights that were trained elsewhere" in without.err
 
 
-def test_help_names_every_choice(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_help_names_every_choice(cli: Cli, wide_terminal: None) -> None:
     """Beside its option; and the architecture and recipe that are taken without one."""
-    monkeypatch.setenv("COLUMNS", "300")
-    monkeypatch.setenv("NO_COLOR", "1")
     lines = cli("train", "--help").out.splitlines()
     for option, choices in (("--recipe", RECIPES), ("--device", DEVICES), ("--precision", PRECISIONS)):
         (line,) = (line for line in lines if re.match(rf"\W*{option}(?!\S)", line))
