@@ -1,0 +1,102 @@
+"""Labels by depth and pose from several keyframes, the rest by flow: what each of them can answer best.
+
+A pixel asks the newest keyframe that saw its point; then earlier ones, newest first; then the chained flow. Classes
+that move by themselves (`moving`) are never carried by geometry, which would leave them where they stood.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from stsem.classes import NO_LABEL, ClassSet, Labels, normalised
+from stsem.geometry.carried import Bools, Carried
+from stsem.geometry.reproject import DEFAULT_AGREEMENT, Agreement, Correspondence, View, among, correspond
+from stsem.uncertainty import Confidence
+
+MOVING = frozenset(map(normalised, (
+    "person", "pedestrian", "rider", "human", "people", "bicyclist", "cyclist", "motorcyclist", "animal", "dog", "cat",
+    "car", "truck", "bus", "train", "motorcycle", "motorbike", "bicycle", "vehicle", "caravan", "trailer",
+)))  # fmt: skip
+"""Names of classes that move by themselves, as `normalised` writes them."""
+
+SAMPLES = 2048
+"""Pixels by which an earlier keyframe is tried before all are asked."""
+MIN_GAIN = 0.005
+"""An earlier keyframe that would cover less of the image than this is not asked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A keyframe with the place of its pixels in space.
+
+    Args:
+        view: its depth, pose and camera.
+        labels: (H, W) uint8 of the size of its depth.
+        confidence: (H, W) float32, or None.
+    """
+
+    view: View
+    labels: Labels
+    confidence: Confidence | None = None
+
+    def without(self, moving: Bools) -> "Source":
+        """The same keyframe with NO_LABEL for the classes that `moving` (256,) names."""
+        labels = np.where(moving[self.labels], np.uint8(NO_LABEL), self.labels)
+        return Source(self.view, labels, self.confidence)
+
+
+def moving_classes(classes: ClassSet) -> Bools:
+    """(256,) bool: the ids of `classes` that are never carried by geometry."""
+    table = np.zeros(256, np.bool_)
+    table[: len(classes)] = [normalised(name) in MOVING for name in classes.names]
+    return table
+
+
+def carry(
+    current: View, sources: Sequence[Source], rest: Carried, *, moving: Bools, max_earlier: int = 4,
+    agreement: Agreement = DEFAULT_AGREEMENT,
+) -> Carried:  # fmt: skip
+    """Labels for `current` from `sources`, and `rest` where none of them saw the point.
+
+    Covered is what depth covers, and what flow covers of the classes that move.
+
+    Args:
+        current: the frame to label.
+        sources: keyframes, the newest first, `without` the moving classes; none is allowed.
+        rest: by flow, of the size of `current`.
+        moving: (256,) bool, as `moving_classes` gives them.
+        max_earlier: how many keyframes after the first are asked for what is still missing. Those that would add less
+            than MIN_GAIN of the image are passed over and do not count.
+        agreement: the test against occlusion.
+    """
+    labels = np.full(current.depth.shape, NO_LABEL, np.uint8)
+    confidence = None if rest.confidence is None else rest.confidence.copy()
+    for i, pairs in _asked(current, [source.view for source in sources], labels, max_earlier, agreement):
+        pairs.fetch(sources[i].labels, labels)
+        if confidence is not None and sources[i].confidence is not None:
+            pairs.fetch(sources[i].confidence, confidence)
+    holes = labels == NO_LABEL
+    np.copyto(labels, rest.labels, where=holes)
+    if confidence is not None and rest.confidence is not None:
+        np.copyto(confidence, rest.confidence, where=holes)
+    return Carried(labels, confidence, ~holes | (rest.covered & moving[rest.labels]))
+
+
+def _asked(
+    current: View, views: Sequence[View], labels: Labels, max_earlier: int, agreement: Agreement
+) -> Iterator[tuple[int, Correspondence]]:
+    """(number of the view, partners in it): of all pixels for the first, then of those that `labels` still lacks."""
+    if views:
+        yield 0, correspond(current, views[0], agreement=agreement)
+    asked, rows, total = 0, None, labels.size
+    for i, view in enumerate(views[1:], 1):
+        if asked == max_earlier:
+            return
+        rows = np.flatnonzero((labels == NO_LABEL) & (current.depth > 0)) if rows is None else rows
+        sample = rows[:: max(1, len(rows) // SAMPLES)]
+        hits = np.count_nonzero(among(current, view, sample, agreement=agreement).found)
+        if hits * len(rows) > MIN_GAIN * total * len(sample):
+            yield i, among(current, view, rows, agreement=agreement)
+            asked, rows = asked + 1, None

@@ -1,0 +1,192 @@
+"""Which pixel of a keyframe shows the same point of the scene: the exact backward warp by depth and pose.
+
+Each pixel of the current frame is taken into space by its own depth, moved into the keyframe and projected there:
+z_k (u_k, v_k, 1) = K_k (R z K^-1 (u, v, 1) + t), with (R, t) = T_keyframe<-current. It is a gather, so there are no
+holes between pixels; what another surface hid from the keyframe fails the test of its depth there.
+"""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from stsem.camera import Camera
+from stsem.frame import Depth
+from stsem.pose import Pose, inverse
+
+Bools = npt.NDArray[np.bool_]
+Float32 = npt.NDArray[np.float32]
+Places = npt.NDArray[np.int16]
+"""(h, w, 2) int16 column and row of the keyframe."""
+Rows = npt.NDArray[np.intp]
+Value = TypeVar("Value", np.uint8, np.float32)
+
+PACKED_WIDTH = 256
+NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1))
+"""(column, row) steps to the pixels beside one, in the order in which they are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Where the pixels of one frame are in space.
+
+    Args:
+        depth: (H, W) float32 metres along z, NaN unknown.
+        T_WC: (4, 4) world from camera.
+        camera: of the size of `depth`, without distortion.
+
+    Raises:
+        ValueError: the camera is distorted or of another size.
+    """
+
+    depth: Depth
+    T_WC: Pose
+    camera: Camera
+
+    def __post_init__(self) -> None:
+        size = (self.camera.height, self.camera.width)
+        if self.depth.shape != size or self.camera.is_distorted:
+            raise ValueError(
+                f"depth {self.depth.shape} must have the size of an undistorted camera, but it is {size}, "
+                f"distortion {self.camera.distortion}"
+            )
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How far apart two depths of one point may be: z (share + per_m z) metres at the distance z.
+
+    The second term is the axial noise of cameras that triangulate, which grows with the square of the distance.
+    """
+
+    share: float = 0.03
+    per_m: float = 0.005
+
+
+DEFAULT_AGREEMENT = Agreement()
+
+
+@dataclass(frozen=True, eq=False)
+class Correspondence:
+    """Pixels of the current frame with their partners in a keyframe; made by `correspond`.
+
+    Args:
+        partners: (h, w, 2) int16 pixels of the keyframe, without meaning where not `found`.
+        found: (h, w) bool.
+        rows: (h * w,) the pixels of the current frame, counted row by row, that the entries stand for, the last one
+            repeated at the end; None where they are the whole image.
+    """
+
+    partners: Places
+    found: Bools
+    rows: Rows | None
+
+    def fetch(self, values: npt.NDArray[Value], onto: npt.NDArray[Value]) -> None:
+        """Write the `values` (H, W) of the keyframe into `onto` (H, W) at the pixels that were found."""
+        if not self.found.size:
+            return
+        fetched = np.asarray(cv2.remap(values, self.partners, None, cv2.INTER_NEAREST), values.dtype)  # type: ignore[call-overload]
+        if self.rows is None:
+            np.copyto(onto, fetched, where=self.found)
+        else:
+            onto.reshape(-1)[self.rows[self.found.reshape(-1)]] = fetched[self.found]
+
+
+def correspond(
+    current: View, keyframe: View, *, where: Bools | None = None, agreement: Agreement = DEFAULT_AGREEMENT
+) -> Correspondence:
+    """The pixels of `current` that `keyframe` saw too.
+
+    A pixel without depth in either frame has no partner. Where the depth of the nearest keyframe pixel disagrees, the
+    first pixel beside it that agrees is taken: at an edge, rounding may fall on the wrong side.
+
+    Args:
+        current, keyframe: the two frames; their sizes may differ.
+        where: (H, W) the pixels asked for; None for all.
+        agreement: the test against occlusion.
+    """
+    if where is None:
+        return _correspond(current, keyframe, None, agreement)
+    return among(current, keyframe, np.flatnonzero(where & (current.depth > 0)), agreement=agreement)
+
+
+def among(
+    current: View, keyframe: View, rows: Rows, *, agreement: Agreement = DEFAULT_AGREEMENT
+) -> Correspondence:
+    """`correspond` for the pixels `rows` (n,) of the current frame, counted row by row."""
+    width = min(PACKED_WIDTH, max(1, len(rows)))
+    return _correspond(current, keyframe, np.pad(rows, (0, -len(rows) % width), mode="edge") if len(rows) else rows, agreement)
+
+
+def _correspond(current: View, keyframe: View, rows: Rows | None, agreement: Agreement) -> Correspondence:
+    if rows is not None and not len(rows):
+        return Correspondence(np.empty((0, 1, 2), np.int16), np.empty((0, 1), np.bool_), rows)
+    u, v, z = _projected(current, keyframe, rows)
+    partners = np.asarray(cv2.convertMaps(u, v, cv2.CV_16SC2, nninterpolation=True)[0], np.int16)
+    limit = z * np.float32(agreement.per_m)
+    limit += np.float32(agreement.share)
+    limit *= z
+    found = _agrees(keyframe.depth, partners, z, limit)
+    _search_beside(keyframe.depth, partners, found, z, limit)
+    return Correspondence(partners, found, rows)
+
+
+def _projected(current: View, keyframe: View, rows: Rows | None) -> tuple[Float32, Float32, Float32]:
+    """Pixel (u, v) and depth z in the keyframe of the pixels `rows` of the current frame, or of all; (h, w) each.
+
+    NaN where the current frame has no depth; z is not positive where the keyframe looks away.
+    """
+    T, K = inverse(keyframe.T_WC) @ current.T_WC, keyframe.camera.K
+    M, t = K @ T[:3, :3] @ np.linalg.inv(current.camera.K), (K @ T[:3, 3]).astype(np.float32)
+    x, y, depth = _pixels(current, rows)
+    moved = []
+    for (a, b, c), shift in zip(M, t, strict=True):
+        # Written out instead of a matrix product: BLAS may round differently with other thread counts.
+        ray = (b * y + c).astype(np.float32) + (a * x).astype(np.float32)
+        ray *= depth
+        ray += shift
+        moved.append(ray)
+    u, v, z = moved
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        per_z = 1 / z
+        u *= per_z
+        v *= per_z
+    return u, v, z
+
+
+def _pixels(view: View, rows: Rows | None) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], Float32]:
+    """Columns, rows and depths of the pixels asked for; they broadcast to the shape (h, w) of the depths."""
+    width, height = view.camera.width, view.camera.height
+    if rows is None:
+        return np.arange(width, dtype=np.float64)[None, :], np.arange(height, dtype=np.float64)[:, None], view.depth
+    packed = rows.reshape(-1, min(PACKED_WIDTH, len(rows)))
+    y, x = np.divmod(packed.astype(np.int32), np.int32(width))
+    return x.astype(np.float64), y.astype(np.float64), view.depth.reshape(-1).take(packed)
+
+
+def _agrees(depth: Depth, partners: Places, z: Float32, limit: Float32) -> Bools:
+    """Whether `depth` at the partners is within `limit` of z; not outside the image and not where either is unknown."""
+    there = cv2.remap(depth, partners, None, cv2.INTER_NEAREST, borderValue=np.nan)  # type: ignore[call-overload]
+    there -= z
+    np.abs(there, out=there)
+    return np.asarray(there <= limit)
+
+
+def _search_beside(depth: Depth, partners: Places, found: Bools, z: Float32, limit: Float32) -> None:
+    """For pixels with depth that found no partner, write the first of its neighbours that agrees, if one does."""
+    height, width = depth.shape
+    flat_partners, flat_found, flat_depth = partners.reshape(-1, 2), found.reshape(-1), depth.reshape(-1)
+    left = np.flatnonzero(~flat_found & (z.reshape(-1) > 0))
+    x, y = flat_partners[left].astype(np.int32).T
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    left, x, y = left[inside], x[inside], y[inside]
+    z, limit = z.reshape(-1)[left], limit.reshape(-1)[left]
+    for right, down in NEIGHBOURS:
+        beside_x, beside_y = np.clip(x + right, 0, width - 1), np.clip(y + down, 0, height - 1)
+        agrees = np.abs(flat_depth.take(beside_y * width + beside_x) - z) <= limit
+        hit, rest = left[agrees], ~agrees
+        flat_partners[hit, 0], flat_partners[hit, 1] = beside_x[agrees], beside_y[agrees]
+        flat_found[hit] = True
+        left, x, y, z, limit = left[rest], x[rest], y[rest], z[rest], limit[rest]
