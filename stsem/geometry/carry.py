@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from stsem.classes import NO_LABEL, ClassSet, Labels, normalised
 from stsem.geometry.carried import Bools, Carried
@@ -21,7 +20,7 @@ MOVING = frozenset(map(normalised, (
 )))  # fmt: skip
 """Names of classes that move by themselves, as `normalised` writes them."""
 
-SAMPLES = 2048
+SAMPLES = 512
 """Pixels by which an earlier keyframe is tried before all are asked."""
 MIN_GAIN = 0.005
 """An earlier keyframe that would cover less of the image than this is not asked."""
@@ -55,7 +54,7 @@ def moving_classes(classes: ClassSet) -> Bools:
 
 
 def carry(
-    current: View, sources: Sequence[Source], rest: Carried, *, moving: Bools, max_earlier: int = 4,
+    current: View, sources: Sequence[Source], rest: Carried, *, moving: Bools, max_earlier: int = 8,
     agreement: Agreement = DEFAULT_AGREEMENT,
 ) -> Carried:  # fmt: skip
     """Labels for `current` from `sources`, and `rest` where none of them saw the point.
@@ -73,10 +72,10 @@ def carry(
     """
     labels = np.full(current.depth.shape, NO_LABEL, np.uint8)
     confidence = None if rest.confidence is None else rest.confidence.copy()
-    for i, pairs in _asked(current, [source.view for source in sources], labels, max_earlier, agreement):
-        pairs.fetch(sources[i].labels, labels)
-        if confidence is not None and sources[i].confidence is not None:
-            pairs.fetch(sources[i].confidence, confidence)
+    for source, pairs in _asked(current, sources, labels, max_earlier, agreement):
+        pairs.fetch(source.labels, labels)
+        if confidence is not None and source.confidence is not None:
+            pairs.fetch(source.confidence, confidence)
     holes = labels == NO_LABEL
     np.copyto(labels, rest.labels, where=holes)
     if confidence is not None and rest.confidence is not None:
@@ -85,18 +84,19 @@ def carry(
 
 
 def _asked(
-    current: View, views: Sequence[View], labels: Labels, max_earlier: int, agreement: Agreement
-) -> Iterator[tuple[int, Correspondence]]:
-    """(number of the view, partners in it): of all pixels for the first, then of those that `labels` still lacks."""
-    if views:
-        yield 0, correspond(current, views[0], agreement=agreement)
-    asked, rows, total = 0, None, labels.size
-    for i, view in enumerate(views[1:], 1):
+    current: View, sources: Sequence[Source], labels: Labels, max_earlier: int, agreement: Agreement
+) -> Iterator[tuple[Source, Correspondence]]:
+    """Each source with its pairs: of all pixels for the first, then of those that `labels` still lacks."""
+    for source in sources[:1]:
+        yield source, correspond(current, source.view, agreement=agreement)
+    asked, rows = 0, None
+    for source in sources[1:]:
         if asked == max_earlier:
             return
-        rows = np.flatnonzero((labels == NO_LABEL) & (current.depth > 0)) if rows is None else rows
+        if rows is None:
+            rows = np.flatnonzero((labels == NO_LABEL) & (current.depth > 0))
         sample = rows[:: max(1, len(rows) // SAMPLES)]
-        hits = np.count_nonzero(among(current, view, sample, agreement=agreement).found)
-        if hits * len(rows) > MIN_GAIN * total * len(sample):
-            yield i, among(current, view, rows, agreement=agreement)
+        hits = np.count_nonzero(among(current, source.view, sample, agreement=agreement, beside=False).found)
+        if hits * len(rows) > MIN_GAIN * labels.size * len(sample):
+            yield source, among(current, source.view, rows, agreement=agreement, beside=False)
             asked, rows = asked + 1, None

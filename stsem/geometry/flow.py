@@ -6,6 +6,7 @@ M_t(x) = M_{t-1}(x + f_t(x)), where f_t points from frame t to frame t - 1 and M
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from stsem.frame import Image
 from stsem.geometry.carried import Bools, Carried
 from stsem.uncertainty import Confidence
 
+Value = TypeVar("Value", np.uint8, np.float32)
 Grey = npt.NDArray[np.uint8]
 Field = npt.NDArray[np.float32]
 """(h, w, 2) float32: x and y at each pixel of the working image."""
@@ -23,6 +25,8 @@ Field = npt.NDArray[np.float32]
 WORKING_SIDE = 480
 """Longer side, in pixels, of the images between which flow is sought (docs/propagation.md has what others cost)."""
 PRESET = cv2.DISOPTICAL_FLOW_PRESET_FAST
+MIN_SIDE = 16
+"""A smaller image has no room for a pyramid of patches; nothing is said to move there."""
 
 
 def working_grey(image: Image, *, side: int = WORKING_SIDE) -> Grey:
@@ -30,25 +34,20 @@ def working_grey(image: Image, *, side: int = WORKING_SIDE) -> Grey:
     height, width = image.shape[:2]
     scale = side / max(width, height)
     if scale < 1:
-        # Resized in colour: grey of the small image costs less, and is the same to a rounding.
         size = max(1, round(width * scale)), max(1, round(height * scale))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
 
 
 def backward_flow(current: Grey, previous: Grey) -> Field:
-    """Where each pixel of `current` was in `previous`, as an offset in pixels (Kroeger et al. 2016, DIS).
+    """Where each pixel of `current` was in `previous`, as an offset, by dense inverse search (Kroeger et al. 2016).
 
     Args:
-        current, previous: (h, w) of one size, at least 8 x 8 pixels or without any motion to find.
+        current, previous: (h, w) of one size; below MIN_SIDE the flow is zero.
     """
     if min(current.shape) < MIN_SIDE:
         return np.zeros((*current.shape, 2), np.float32)
     return np.asarray(_dense_inverse_search().calc(current, previous, None), np.float32)  # type: ignore[call-overload]
-
-
-MIN_SIDE = 16
-"""Smaller images have no room for a patch on a pyramid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +90,9 @@ class Chain:
             size: (width, height) of the answer.
         """
         places = _full_size(self.places, labels.shape, size)
-        moved = _fetched(labels, places)
-        sure = None if confidence is None else np.asarray(_fetched(confidence, places), np.float32)
+        sure = None if confidence is None else _fetched(confidence, places)
         inside = cv2.resize(self.inside.view(np.uint8), size, interpolation=cv2.INTER_NEAREST_EXACT)
-        return Carried(np.asarray(moved, np.uint8), sure, np.asarray(inside, np.uint8).view(np.bool_))
+        return Carried(_fetched(labels, places), sure, np.asarray(inside, np.uint8).view(np.bool_))
 
 
 def _full_size(places: Field, shape: tuple[int, ...], size: tuple[int, int]) -> Field:
@@ -107,8 +105,9 @@ def _full_size(places: Field, shape: tuple[int, ...], size: tuple[int, int]) -> 
     return np.asarray(cv2.resize(scaled, size, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def _fetched(values: npt.NDArray[np.uint8] | Confidence, places: Field) -> npt.NDArray[np.uint8] | Confidence:
-    return cv2.remap(values, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload,return-value]
+def _fetched(values: npt.NDArray[Value], places: Field) -> npt.NDArray[Value]:
+    fetched = cv2.remap(values, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+    return np.asarray(fetched, values.dtype)
 
 
 @lru_cache(maxsize=1)

@@ -20,10 +20,13 @@ Bools = npt.NDArray[np.bool_]
 Float32 = npt.NDArray[np.float32]
 Places = npt.NDArray[np.int16]
 """(h, w, 2) int16 column and row of the keyframe."""
+Pixels = tuple[Float32, Float32, Float32]
+"""Column, row and depth of some pixels; they broadcast to the shape (h, w) of the depths."""
 Rows = npt.NDArray[np.intp]
 Value = TypeVar("Value", np.uint8, np.float32)
 
 PACKED_WIDTH = 256
+STRIP_PIXELS = 1 << 15
 NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """(column, row) steps to the pixels beside one, in the order in which they are tried."""
 
@@ -58,11 +61,12 @@ class View:
 class Agreement:
     """How far apart two depths of one point may be: z (share + per_m z) metres at the distance z.
 
-    The second term is the axial noise of cameras that triangulate, which grows with the square of the distance.
+    The second term is the axial noise of cameras that triangulate, which grows with the square of the distance. The
+    defaults are chosen by measurement (docs/propagation.md).
     """
 
-    share: float = 0.03
-    per_m: float = 0.005
+    share: float = 0.02
+    per_m: float = 0.0
 
 
 DEFAULT_AGREEMENT = Agreement()
@@ -95,75 +99,93 @@ class Correspondence:
 
 
 def correspond(
-    current: View, keyframe: View, *, where: Bools | None = None, agreement: Agreement = DEFAULT_AGREEMENT
+    current: View,
+    keyframe: View,
+    *,
+    where: Bools | None = None,
+    agreement: Agreement = DEFAULT_AGREEMENT,
+    beside: bool = True,
 ) -> Correspondence:
     """The pixels of `current` that `keyframe` saw too.
 
-    A pixel without depth in either frame has no partner. Where the depth of the nearest keyframe pixel disagrees, the
-    first pixel beside it that agrees is taken: at an edge, rounding may fall on the wrong side.
+    A pixel without depth in either frame has no partner.
 
     Args:
         current, keyframe: the two frames; their sizes may differ.
         where: (H, W) the pixels asked for; None for all.
         agreement: the test against occlusion.
+        beside: where the depth of the nearest keyframe pixel disagrees, take the first pixel beside it that agrees: at
+            an edge, rounding may fall on the wrong side.
     """
-    if where is None:
-        return _correspond(current, keyframe, None, agreement)
-    return among(current, keyframe, np.flatnonzero(where & (current.depth > 0)), agreement=agreement)
+    if where is not None:
+        return among(current, keyframe, np.flatnonzero(where & (current.depth > 0)), agreement=agreement, beside=beside)
+    height, width = current.depth.shape
+    x, y = np.arange(width, dtype=np.float32)[None, :], np.arange(height, dtype=np.float32)[:, None]
+    return Correspondence(*_partners((x, y, current.depth), current, keyframe, agreement, beside), rows=None)
 
 
 def among(
-    current: View, keyframe: View, rows: Rows, *, agreement: Agreement = DEFAULT_AGREEMENT
+    current: View, keyframe: View, rows: Rows, *, agreement: Agreement = DEFAULT_AGREEMENT, beside: bool = True
 ) -> Correspondence:
     """`correspond` for the pixels `rows` (n,) of the current frame, counted row by row."""
-    width = min(PACKED_WIDTH, max(1, len(rows)))
-    return _correspond(current, keyframe, np.pad(rows, (0, -len(rows) % width), mode="edge") if len(rows) else rows, agreement)
-
-
-def _correspond(current: View, keyframe: View, rows: Rows | None, agreement: Agreement) -> Correspondence:
-    if rows is not None and not len(rows):
+    if not len(rows):
         return Correspondence(np.empty((0, 1, 2), np.int16), np.empty((0, 1), np.bool_), rows)
-    u, v, z = _projected(current, keyframe, rows)
-    partners = np.asarray(cv2.convertMaps(u, v, cv2.CV_16SC2, nninterpolation=True)[0], np.int16)
+    width = min(PACKED_WIDTH, len(rows))
+    packed = np.pad(rows, (0, -len(rows) % width), mode="edge").reshape(-1, width)
+    y, x = np.divmod(packed.astype(np.int32), np.int32(current.camera.width))
+    pixels = x.astype(np.float32), y.astype(np.float32), current.depth.reshape(-1).take(packed)
+    return Correspondence(*_partners(pixels, current, keyframe, agreement, beside), rows=packed.reshape(-1))
+
+
+def _partners(
+    pixels: Pixels, current: View, keyframe: View, agreement: Agreement, beside: bool
+) -> tuple[Places, Bools]:
+    """(partners, found) of `Correspondence` for some pixels of `current`."""
+    T, K = inverse(keyframe.T_WC) @ current.T_WC, keyframe.camera.K
+    moved = np.empty((3, 4), np.float32)
+    moved[:, :3], moved[:, 3] = K @ T[:3, :3] @ np.linalg.inv(current.camera.K), K @ T[:3, 3]
+    x, y, depth = pixels
+    height, width = depth.shape
+    partners, found = np.empty((height, width, 2), np.int16), np.empty((height, width), np.bool_)
+    # Strip by strip, so that what is computed in between stays in the processor's cache.
+    lines = max(1, STRIP_PIXELS // width)
+    for top in range(0, height, lines):
+        strip = slice(top, top + lines)
+        some = x if len(x) == 1 else x[strip], y[strip], depth[strip]
+        _partners_of_strip(some, moved, keyframe.depth, agreement, beside, partners[strip], found[strip])
+    return partners, found
+
+
+def _partners_of_strip(
+    pixels: Pixels, moved: Float32, depth: Depth, agreement: Agreement, beside: bool, partners: Places, found: Bools
+) -> None:
+    """Write `partners` and `found` for a few lines of pixels."""
+    u, v, z = _projected(pixels, moved)
+    cv2.convertMaps(u, v, cv2.CV_16SC2, partners, nninterpolation=True)
     limit = z * np.float32(agreement.per_m)
     limit += np.float32(agreement.share)
     limit *= z
-    found = _agrees(keyframe.depth, partners, z, limit)
-    _search_beside(keyframe.depth, partners, found, z, limit)
-    return Correspondence(partners, found, rows)
+    found[:] = _agrees(depth, partners, z, limit)
+    if beside:
+        _search_beside(depth, partners, found, z, limit)
 
 
-def _projected(current: View, keyframe: View, rows: Rows | None) -> tuple[Float32, Float32, Float32]:
-    """Pixel (u, v) and depth z in the keyframe of the pixels `rows` of the current frame, or of all; (h, w) each.
+def _projected(pixels: Pixels, moved: Float32) -> tuple[Float32, Float32, Float32]:
+    """Pixel (u, v) and depth z in the keyframe, (h, w) each, by the matrix `moved` (3, 4) of (z u, z v, z, 1).
 
     NaN where the current frame has no depth; z is not positive where the keyframe looks away.
     """
-    T, K = inverse(keyframe.T_WC) @ current.T_WC, keyframe.camera.K
-    M, t = K @ T[:3, :3] @ np.linalg.inv(current.camera.K), (K @ T[:3, 3]).astype(np.float32)
-    x, y, depth = _pixels(current, rows)
-    moved = []
-    for (a, b, c), shift in zip(M, t, strict=True):
-        # Written out instead of a matrix product: BLAS may round differently with other thread counts.
-        ray = (b * y + c).astype(np.float32) + (a * x).astype(np.float32)
+    x, y, depth = pixels
+    # Written out instead of a matrix product: BLAS may round differently with other thread counts.
+    u, v, z = ((b * y + c) + a * x for a, b, c, _ in moved)
+    for ray, shift in zip((u, v, z), moved[:, 3], strict=True):
         ray *= depth
         ray += shift
-        moved.append(ray)
-    u, v, z = moved
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         per_z = 1 / z
         u *= per_z
         v *= per_z
     return u, v, z
-
-
-def _pixels(view: View, rows: Rows | None) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], Float32]:
-    """Columns, rows and depths of the pixels asked for; they broadcast to the shape (h, w) of the depths."""
-    width, height = view.camera.width, view.camera.height
-    if rows is None:
-        return np.arange(width, dtype=np.float64)[None, :], np.arange(height, dtype=np.float64)[:, None], view.depth
-    packed = rows.reshape(-1, min(PACKED_WIDTH, len(rows)))
-    y, x = np.divmod(packed.astype(np.int32), np.int32(width))
-    return x.astype(np.float64), y.astype(np.float64), view.depth.reshape(-1).take(packed)
 
 
 def _agrees(depth: Depth, partners: Places, z: Float32, limit: Float32) -> Bools:
