@@ -3,8 +3,9 @@
     python -m bench.propagation LOG [--every 10] [--frames N] [--methods hold,homography,flow,bare,depth]
 
 Every Nth frame gives its true labels; the frames between are labelled from them by each method, as the offline pass of
-a replay would with the oracle. Prints mIoU and pixel accuracy by distance, the share covered, the score there and
-the score if the rest were right (which more evidence could bring), and the processor time of one thread per frame (median), preparation of the frame included.
+a replay would with the oracle. Prints mIoU and pixel accuracy (means over the distances), the share covered, the score
+there, the score if the rest were right (what more evidence could bring), the processor time of one thread per frame
+(median), and mIoU by distance.
 """
 
 import argparse

