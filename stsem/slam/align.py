@@ -1,0 +1,160 @@
+"""Alignment of depth to depth: projective point-to-plane ICP (Chen and Medioni 1992; Newcombe et al. 2011, eq. 16-22).
+
+The unknown is the pose T_WC of the camera; a step moves it in its own axes, T <- T exp(xi), xi = (translation,
+rotation). So several keyframes add up in one system, and the matrix is the information of an edge to this camera.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from stsem.pose import Pose, inverse
+from stsem.slam.planes import F32, PlaneGrid
+from stsem.slam.rotations import exponential, logarithm
+
+F64 = npt.NDArray[np.float64]
+
+SIGMA = 0.01
+"""Standard deviation of a cell's inverse depth, 1/m: noise, quantisation and what calibration leaves."""
+FLOOR_M = 0.0005
+"""Added to the standard deviation of the distance to a plane: without it those seen edge-on outweigh all others."""
+HUBER = 2.0
+"""Residuals, in standard deviations, from which a point counts linearly."""
+GATE = 0.05
+"""Relative difference of inverse depth up to which a point may belong to a plane."""
+CORRELATED = 8.0
+"""Points whose errors are one and the same: neighbours share the camera's distortion. Information is divided by it."""
+SETTLED = 2e-5
+"""Metres and radians below which a step is the last."""
+SLICE = 256
+"""Points per matrix product: small enough that BLAS never splits one between threads."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """What a camera is aligned to.
+
+    Args:
+        T_WC: (4, 4), its pose.
+        grid: its planes.
+    """
+
+    T_WC: Pose
+    grid: PlaneGrid
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Another opinion on the pose, and its information (6, 6) in the axes of the camera."""
+
+    T_WC: Pose
+    information: F64
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """How points agree with the planes of one reference at one pose.
+
+    Args:
+        information: (6, 6) of the pose, in the axes of the camera: 1/m^2 and 1/rad^2.
+        gradient: (6,) information times the step that would undo the residuals, negated.
+        share: of the points that met a plane near them, 0..1.
+        residual: median distance of those, in standard deviations; inf without any.
+    """
+
+    information: F64
+    gradient: F64
+    share: float
+    residual: float
+
+
+@dataclass(frozen=True, eq=False)
+class Aligned:
+    """A pose, and how it agrees with the first reference."""
+
+    T_WC: Pose
+    agreement: Agreement
+
+
+def align(
+    points: Sequence[tuple[F32, int]], references: Sequence[Reference], start: Pose, prior: Prior | None = None
+) -> Aligned:
+    """The pose at which points lie on the planes of the references.
+
+    Args:
+        points: rounds from coarse to fine, ((n, 3) points in the camera, largest number of steps) each.
+        references: at least one.
+        start: (4, 4) T_WC to begin at.
+        prior: counts where the planes do not say, as along a wall.
+    """
+    pose = start
+    for xyz, steps in points:
+        for _ in range(steps):
+            found = [agreement(xyz, reference, pose) for reference in references]
+            information = np.sum([one.information for one in found], axis=0)
+            gradient = np.sum([one.gradient for one in found], axis=0)
+            if prior is not None:
+                information = information + prior.information
+                gradient = gradient + prior.information @ difference(prior.T_WC, pose)
+            step = -np.linalg.solve(information + np.eye(6), gradient)
+            pose = moved(pose, step)
+            if np.abs(step).max() < SETTLED:
+                break
+    return Aligned(pose, agreement(points[-1][0], references[0], pose))
+
+
+def agreement(xyz: F32, reference: Reference, T_WC: Pose) -> Agreement:
+    """How points (n, 3) of a camera at `T_WC` agree with the planes of a reference."""
+    T = inverse(reference.T_WC) @ T_WC
+    R, t = T[:3, :3].astype(np.float32), T[:3, 3].astype(np.float32)
+    there = xyz[:, :1] * R[:, 0] + xyz[:, 1:2] * R[:, 1] + xyz[:, 2:] * R[:, 2] + t
+    rows, cells = reference.grid.cells(there)
+    planes, z = reference.grid.planes[cells], there[rows, 2]
+    near = np.flatnonzero((planes[:, 4] > 0) & (np.abs(planes[:, 4] * z - 1) < GATE))
+    if not len(near):
+        return Agreement(np.zeros((6, 6)), np.zeros(6), 0.0, np.inf)
+    p, n, d, z = xyz[rows[near]], planes[near, :3], planes[near, 3], z[near]
+    q = there[rows[near]]
+    sigma = np.float32(SIGMA) * d * z + np.float32(FLOOR_M)
+    residual = n[:, 0] * q[:, 0] + n[:, 1] * q[:, 1] + n[:, 2] * q[:, 2] - d
+    size = np.abs(residual) / sigma
+    weight = np.minimum(1, HUBER / np.maximum(size, np.float32(1e-6))) / (sigma * sigma * np.float32(CORRELATED))
+    normal = n[:, :1] * R[0] + n[:, 1:2] * R[1] + n[:, 2:] * R[2]
+    system = _normal_equations(p, normal, residual, weight)
+    return Agreement(system[:6, :6], system[:6, 6], len(near) / len(xyz), float(np.median(size)))
+
+
+def moved(pose: Pose, step: F64) -> Pose:
+    """T exp(step), with the rotation exact and the translation of first order."""
+    result = pose.copy()
+    result[:3, 3] += pose[:3, :3] @ step[:3]
+    R = pose[:3, :3] @ exponential(step[None, 3:])[0]
+    # A step of Newton to the nearest rotation: predictions square what rounding leaves, frame after frame.
+    result[:3, :3] = R @ (1.5 * np.eye(3) - 0.5 * R.T @ R)
+    return result
+
+
+def difference(origin: Pose, pose: Pose) -> F64:
+    """(6,) the step in the axes of `pose` that leads from `origin` to it; the inverse of `moved` for small ones."""
+    turn = origin[:3, :3].T @ pose[:3, :3]
+    return np.concatenate([pose[:3, :3].T @ (pose[:3, 3] - origin[:3, 3]), logarithm(turn[None])[0]])
+
+
+def _normal_equations(p: F32, n: F32, residual: F32, weight: F32) -> F64:
+    """(7, 7) J^T W J with J = (n, p x n, residual), summed in slices in a fixed order."""
+    count = -(-len(p) // SLICE) * SLICE
+    J = np.zeros((count, 7), np.float32)
+    rows = J[: len(p)]
+    rows[:, :3] = n
+    rows[:, 3] = p[:, 1] * n[:, 2] - p[:, 2] * n[:, 1]
+    rows[:, 4] = p[:, 2] * n[:, 0] - p[:, 0] * n[:, 2]
+    rows[:, 5] = p[:, 0] * n[:, 1] - p[:, 1] * n[:, 0]
+    rows[:, 6] = residual
+    weighted = J.copy()
+    weighted[: len(p)] *= weight[:, None]
+    slices = J.reshape(-1, SLICE, 7)
+    products = np.swapaxes(weighted.reshape(-1, SLICE, 7), 1, 2) @ slices
+    total: F64 = products.astype(np.float64).sum(axis=0)
+    return total
