@@ -102,9 +102,9 @@ def plane_grid(depth: Depth, camera: Camera) -> PlaneGrid:
     block = max(1, round(camera.width / COLUMNS))
     width, height = camera.width // block, camera.height // block
     with np.errstate(divide="ignore"):
-        w = 1 / depth[: height * block, : width * block]
-    valid = (w > 1 / FARTHEST_M) & (w < 1 / NEAREST_M)  # false for NaN
-    w = np.where(valid, w, np.float32(0)).astype(np.float32, copy=False)
+        raw = 1 / depth[: height * block, : width * block]
+    valid = (raw > 1 / FARTHEST_M) & (raw < 1 / NEAREST_M)  # false for NaN
+    w: F32 = np.where(valid, raw, np.float32(0)).astype(np.float32, copy=False)
     share, first, second = (_block_means(part, width, height) for part in (valid.astype(np.float32), w, w * w))
     some = np.maximum(share, np.float32(1e-6))
     mean = first / some
