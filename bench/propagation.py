@@ -188,6 +188,8 @@ def main() -> None:
     cv2.setNumThreads(1)
     with open_log([given.log]) as log:
         for name, tally in measure(log, given.methods.split(","), given.every, given.frames).items():
+            if not tally.by_distance:
+                raise SystemExit("No frame between the keyframes has truth: nothing can be scored.")
             print(*tally.lines(name), sep="\n")
 
 
