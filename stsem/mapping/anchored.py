@@ -1,8 +1,8 @@
 """A labelled scene that can be bent: points hang on the keyframes of SLAM, and go where a closed loop moves those.
 
-The cloud of `LabelledCloud` is in the world for good. Here each part keeps its points in the axes of the keyframe it was
-measured against (its anchor); the world is made from them with the poses known in the end. A part need not be of the
-anchor's own frame: backproject it with T_KC, its camera in the anchor, in the place of T_WC.
+The cloud of `LabelledCloud` is in the world for good. Here each part keeps its points in the axes of the keyframe that
+it was measured against (its anchor); the world is made from them with the poses known in the end. A part need not be
+of the frame of its anchor: backproject it with T_KC, its camera in the anchor, in the place of T_WC.
 """
 
 from collections.abc import Sequence
