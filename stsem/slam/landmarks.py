@@ -14,13 +14,14 @@ from stsem.slam.planes import FARTHEST_M, NEAREST_M
 
 WORKING_SIDE = 320
 """Longer side of the image in which points are sought: a quarter of the time at 640, and depth refines the pose."""
-MAX_FEATURES = 300
-MAX_DISTANCE = 50
+FEW, MANY = 300, 600
+"""Points of a frame that is followed, and of one that is kept or has to be recognised."""
+MAX_DISTANCE = 64
 """Bits of 256 by which partners may differ; unrelated points differ by 128 on average."""
 MIN_MATCHES = 8
 REPROJECTION_PX = 2.0
 """Largest error of an inlier, in pixels of the image searched."""
-CONFIDENCE, ITERATIONS = 0.99, 100
+CONFIDENCE, ITERATIONS = 0.99, 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +57,13 @@ class Resection:
     matches: int
 
 
-def find_landmarks(image: Image, depth: Depth | None, camera: Camera) -> Landmarks:
-    """ORB points of an (H, W, 3) RGB image, placed by its depth; none in an image without texture."""
+def find_landmarks(image: Image, depth: Depth | None, camera: Camera, *, most: int = MANY) -> Landmarks:
+    """ORB points of an (H, W, 3) RGB image, placed by its depth; none in an image without texture; at most `most`."""
     height, width = image.shape[:2]
     scale = min(1.0, WORKING_SIDE / max(width, height))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     grey = cv2.resize(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), size, interpolation=cv2.INTER_AREA)
-    keypoints, descriptors = _detector().detectAndCompute(grey, None)
+    keypoints, descriptors = _detector(most).detectAndCompute(grey, None)
     if descriptors is None or not keypoints:
         return Landmarks(np.empty((0, 2), np.float32), np.empty((0, 32), np.uint8), np.empty((0, 3), np.float32))
     grain = np.array([width / size[0], height / size[1]], np.float32)
@@ -112,9 +113,9 @@ def _placed(xy: npt.NDArray[np.float32], depth: Depth | None, camera: Camera) ->
     return np.stack([x, y, z], axis=1).astype(np.float32)
 
 
-@lru_cache(maxsize=1)
-def _detector() -> cv2.ORB:
-    return cv2.ORB.create(nfeatures=MAX_FEATURES, nlevels=5, edgeThreshold=16, fastThreshold=7)
+@lru_cache(maxsize=4)
+def _detector(most: int) -> cv2.ORB:
+    return cv2.ORB.create(nfeatures=most, nlevels=5, edgeThreshold=16, fastThreshold=7)
 
 
 def _usac(seed: int, threshold_px: float) -> cv2.UsacParams:

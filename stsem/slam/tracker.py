@@ -11,7 +11,7 @@ from stsem.frame import Frame
 from stsem.pose import Pose, inverse
 from stsem.slam.align import Agreement, Aligned, Prior, Reference, agreement, align
 from stsem.slam.keyframe import Keyframe, is_far
-from stsem.slam.landmarks import Landmarks, Resection, find_landmarks, resect
+from stsem.slam.landmarks import FEW, MANY, Landmarks, Resection, find_landmarks, resect
 from stsem.slam.planes import F32, PlaneGrid, plane_grid
 from stsem.slam.posegraph import Edge
 from stsem.slam.recognise import most_alike
@@ -23,7 +23,9 @@ NEIGHBOURS = 6
 MIN_SHARE, MAX_RESIDUAL, MIN_INFORMATION = 0.3, 1.0, 100.0
 """Less agreement of depth is lost. Information: a standard deviation of 10 cm or 0.1 rad in the worst direction."""
 MIN_INLIERS = 20
-"""Points on which a pose is believed with no depth to confirm it, or after being lost."""
+"""Points on which a pose is believed with no depth to confirm it."""
+MIN_RELOCALISED_INLIERS = 12
+"""Points on which depth is asked whether a lost camera is where they say."""
 MIN_RELOCALISED_SHARE = 0.5
 MIN_POINTS = 500
 """Cells with a plane below which a frame counts as without depth."""
@@ -106,7 +108,8 @@ class Tracker:
         self.keyframes = [replace(one, T_WC=pose) for one, pose in zip(self.keyframes, poses, strict=True)]
 
     def _view(self, frame: Frame) -> _View:
-        landmarks = find_landmarks(frame.image, frame.depth, self._camera)
+        most = MANY if self._T_KC is None else FEW
+        landmarks = find_landmarks(frame.image, frame.depth, self._camera, most=most)
         grid = None if frame.depth is None else plane_grid(frame.depth, self._camera)
         enough = grid is not None and np.count_nonzero(grid.planes[:, 4]) >= MIN_POINTS
         return _View(frame, landmarks, grid if enough else None)
@@ -141,7 +144,7 @@ class Tracker:
         for position in most_alike(view.landmarks, [one.landmarks for one in self.keyframes], CANDIDATES):
             keyframe = self.keyframes[position]
             seen = resect(keyframe.landmarks, view.landmarks, self._camera, seed=self._draw(view, position))
-            if seen is None or seen.inliers < MIN_INLIERS:
+            if seen is None or seen.inliers < MIN_RELOCALISED_INLIERS:
                 continue
             found = _refined(view.grid, keyframe, seen, keyframe.T_WC @ seen.T_KC)
             if found.agreement.share >= MIN_RELOCALISED_SHARE and not _doubt(found.agreement, seen):
@@ -184,7 +187,8 @@ class Tracker:
     def _add(self, view: _View, grid: PlaneGrid, T_WC: Pose) -> None:
         frame = view.frame
         assert frame.depth is not None
-        self.keyframes.append(Keyframe(frame.index, frame.stamp_ns, T_WC, view.landmarks, frame.depth, grid))
+        landmarks = find_landmarks(frame.image, frame.depth, self._camera, most=MANY)
+        self.keyframes.append(Keyframe(frame.index, frame.stamp_ns, T_WC, landmarks, frame.depth, grid))
         self._current, self._T_KC = len(self.keyframes) - 1, np.eye(4)
 
     def _lose(self, reason: str) -> Tracked:
