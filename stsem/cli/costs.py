@@ -28,10 +28,10 @@ def measure(
     """Write a profile with the network on one and on two cores."""
     from stsem.cli.console import note
     from stsem.log.log import open_log
-    from stsem.replay.build import build_model
+    from stsem.replay.build import build_model, needed_roles
     from stsem.replay.calibrate import measure as calibrate
     from stsem.replay.costing import calibration_frames, subject
-    from stsem.replay.engine import can_map
+    from stsem.replay.posing import can_map
     from stsem.replay.settings import validated
 
     config = validated(
@@ -39,7 +39,7 @@ def measure(
     )
     with open_log([log]) as opened:
         built, fused = build_model(opened, config), can_map(opened, config)
-        frames = calibration_frames(opened, built.needs(fused=fused))
+        frames = calibration_frames(opened, needed_roles(built, config, fused=fused))
         wanted = subject(opened, config, built, cores=(1, 2), fused=fused)
         profile = calibrate(wanted, frames, samples=samples, limit_ns=round(seconds * 1e9))
     profile.save(out)

@@ -43,9 +43,17 @@ def replay(
         str | None, option("--keyframes", panel=_PIPELINE, metavar="POLICY", help="paper or every:N. [paper]")
     ] = None,
     propagation: Annotated[
-        str | None, option("--propagation", panel=_PIPELINE, metavar="METHOD", help="hold or homography. [homography]")
+        str | None,
+        option(
+            "--propagation",
+            panel=_PIPELINE,
+            metavar="METHOD",
+            help="hold, homography, homography-chained, flow or depth. [homography]",
+        ),
     ] = None,
-    pose: Annotated[str | None, option("--pose", panel=_PIPELINE, help="Where poses come from: log. [log]")] = None,
+    pose: Annotated[
+        str | None, option("--pose", panel=_PIPELINE, metavar="log|slam", help="Where poses come from. [log]")
+    ] = None,
     map_: Annotated[str | None, option("--map", panel=_PIPELINE, metavar="on|off", help="Labelled map. [on]")] = None,
     depth_registered: Annotated[
         str | None,

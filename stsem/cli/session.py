@@ -22,11 +22,12 @@ from stsem.log.container.source import shown_name, without_secrets
 from stsem.log.describe import log_name
 from stsem.log.log import Log, open_log
 from stsem.plain import MAX_SENTENCE, plain
-from stsem.replay.build import Model, build_model, truth_frames
+from stsem.replay.build import Model, build_model, needed_roles, truth_frames
 from stsem.replay.config import RunConfig
 from stsem.replay.costing import Costing, costing
 from stsem.replay.documents import build_document
-from stsem.replay.engine import can_map, replay_log
+from stsem.replay.engine import replay_log
+from stsem.replay.posing import can_map
 from stsem.replay.runs import Context
 from stsem.replay.timing import deadline_ns
 from stsem.report.annotated import AnnotatedLog
@@ -146,7 +147,7 @@ def _sustainable(session: Session) -> dict[str, Sustainable]:
         return {}
     usable = truth_frames(log) if config.is_oracle else None
     deadline = deadline_ns(config.deadline_ms, log.period_ns, Fraction(1))
-    needs = session.model.needs(fused=session.fused)
+    needs = needed_roles(session.model, config, fused=session.fused)
     probe = Probe(log, config, costs.of, needs=needs, fused=session.fused, usable=usable, patience_ns=deadline)
     return {
         mode.name: search(partial(probe.attempt, mode), capture_hz=1e9 / log.period_ns, deadline_ns=deadline)

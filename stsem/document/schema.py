@@ -12,28 +12,12 @@ from stsem.document.calibration import Calibration, ErrorDetection
 from stsem.document.origin import Host, Identity, Input
 from stsem.document.part import Count, Number, Part, Share
 from stsem.document.timing import Latency, Outcomes, Throughput
+from stsem.document.trajectory import TrajectoryScore
 
 SCHEMA_VERSION: Literal[1] = 1
 
 State = Literal["valid", "lossy", "invalid"]
 AccuracyState = Literal["measured", "not measured"]
-
-
-class TrajectoryScore(Part):
-    """How good the poses are that the run used."""
-
-    pose: str = "log"
-    """Where the poses come from: `log` or `slam`."""
-    tracked_share: Share = None
-    """Frames with a pose over all frames. Fraction."""
-    ate_rmse_m: Number = None
-    """Root mean square of the position error after rigid alignment, metres."""
-    rpe_translation_m: Number = None
-    """Root mean square translation error over one second, metres."""
-    rpe_rotation_deg: Number = None
-    """Root mean square rotation error over one second, degrees."""
-    n: Count = 0
-    """Poses compared."""
 
 
 class MapScore(Part):
@@ -74,6 +58,11 @@ class Run(Part):
     """Log indices of the frames that went through the network."""
     keyframe_reasons: dict[str, Count] = Field(default_factory=dict)
     """Why frames became keyframes -> how many."""
+    covered: Share = None
+    """Mean over the predicted answers of the share of pixels that rest on evidence: a keyframe saw the point, so far as
+    the method can tell. null where the method does not say. Fraction."""
+    remarks: dict[str, Count] = Field(default_factory=dict)
+    """What the prediction had to do without, for how many frames."""
     keyframes_moved: Count = 0
     """Oracle only: choices moved to the next frame that has truth."""
     stages_inside: tuple[str, ...] = ()
@@ -91,7 +80,8 @@ class Run(Part):
     loss: Loss | None = None
     """Where mIoU is lost on the way from 1 to the streaming score."""
     strata: dict[str, Score] = Field(default_factory=dict)
-    """Offline scores of parts of the frames: `segmented`, `propagated`."""
+    """Offline scores of parts of the frames: `segmented`, `propagated`; `covered`: the pixels of the latter that rest
+    on evidence."""
     by_distance: tuple[DistanceRow, ...] = ()
     """Offline accuracy by distance to the keyframe, ascending."""
     by_distance_summary: DistanceSummary | None = None

@@ -63,8 +63,10 @@ class RunConfig(BaseModel):
         1.0, gt=0, le=LONGEST_S, description="paper: longest time between keyframes, seconds."
     )
     propagation: str = Field("homography", description="How frames between keyframes are predicted.")
-    pose: Literal["log"] = Field("log", description="Where the camera's pose comes from.")
-    map: Switch = Field(True, description="Build the labelled map where the log has depth and poses.")
+    pose: Literal["log", "slam"] = Field(
+        "log", description="Where the camera's pose comes from: the log, or 'slam' on colour and depth."
+    )
+    map: Switch = Field(True, description="Build the labelled map where there is depth and poses.")
     depth_registered: Literal["auto", "yes", "no"] = Field(
         "auto", description="Whether depth pixels match colour pixels."
     )

@@ -14,12 +14,16 @@ class Mode:
     Args:
         name: as on the command line and in the report.
         segments_every_frame: no prediction: each taken frame goes through the network.
-        network_cores: cores that the network claims while it runs.
+        network_cores: cores that the network claims while it runs, where `track` needs none.
     """
 
     name: str
     segments_every_frame: bool
     network_cores: int
+
+    def cores(self, available: int, *, tracks: bool) -> int:
+        """Cores that the network claims of those `available`; one where `track` works beside it (DESIGN 3)."""
+        return 1 if tracks else min(self.network_cores, available)
 
 
 MODES = {

@@ -5,7 +5,8 @@ import pytest
 from stsem.document.accuracy import Consistency, Coverage, DistanceRow, DistanceSummary, Loss, Score
 from stsem.document.calibration import Calibration, ErrorDetection, ReliabilityBin
 from stsem.document.part import Part
-from stsem.document.schema import MapScore, TrajectoryScore
+from stsem.document.schema import MapScore
+from stsem.document.trajectory import TrajectoryScore
 from stsem.document.timing import Distribution, Latency, Outcomes, Throughput
 from stsem.metrics.catalogue import CATALOGUE, facts
 

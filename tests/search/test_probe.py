@@ -10,8 +10,9 @@ import pytest
 
 from stsem.log.log import Log, open_log
 from stsem.log.plan import NEEDS
-from stsem.replay.build import build_model, truth_frames
-from stsem.replay.engine import can_map, replay_log
+from stsem.replay.build import build_model, needed_roles, truth_frames
+from stsem.replay.engine import replay_log
+from stsem.replay.posing import can_map
 from stsem.replay.settings import validated
 from stsem.result import FrameResult, Outcome
 from stsem.search.probe import Probe
@@ -55,7 +56,7 @@ def test_the_same_outcomes(gappy_log: Log, made_up_costs: Path, settings: dict[s
     source = ProfileCosts(load_profile(made_up_costs), config.seed, gappy_log.info.sha256)
     costs: Callable[[object], CostSource] = lambda mode: source  # noqa: E731
     real = replay_log(gappy_log, config, model, costs, lambda done, total: None)
-    probe = Probe(gappy_log, config, costs, needs=model.needs(fused=fused), fused=fused, usable=truth_frames(gappy_log))
+    probe = Probe(gappy_log, config, costs, needs=needed_roles(model, config, fused=fused), fused=fused, usable=truth_frames(gappy_log))
     for run in real.runs:
         assert run.real_time is not None
         assert shown(probe.attempt(run.mode, config.exact_rate)) == shown(run.real_time.results)

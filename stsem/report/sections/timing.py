@@ -68,7 +68,7 @@ def _stages(runs: list[Run]) -> Table:
         for run in runs:
             part = run.latency_ms.stages.get(stage) if run.latency_ms else None
             if part and part.service.n:
-                beside = "" if stage in ANSWER_STAGES else " (beside the path)"
+                beside = "" if stage in ANSWER_STAGES or stage in run.stages_inside else " (beside the path)"
                 rows.append(Row((stage + beside, run.mode, percentile(part.service, "p50"), number(part.service.max),
                                  number(part.service.mean), number(part.waiting.mean), number(part.waiting.max),
                                  count(part.service.n))))  # fmt: skip
@@ -131,7 +131,7 @@ def outcomes_section(document: Document) -> Section | None:
         Table(columns, tuple(rows), notes),
     ]
     blocks += [Text(_keyframes(run)) for run in runs if run.keyframes]
-    disabled = tuple(f"`{run.mode}`: {stage} was off for {count(n)} frames, an optional channel was missing."
+    disabled = tuple(f"`{run.mode}`: {stage} was off for {count(n)} frames, an optional channel or a pose was missing."
                      for run in runs for stage, n in run.stages_disabled.items())  # fmt: skip
     return Section("What became of the frames", (*blocks, Items(disabled)) if disabled else tuple(blocks))
 
