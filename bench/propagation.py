@@ -1,6 +1,6 @@
 """Accuracy and cost of the warps between keyframes, without the replay.
 
-    python -m bench.propagation LOG [--every 10] [--frames N] [--methods hold,homography,flow,bare,depth]
+    python -m bench.propagation LOG [--every 10] [--frames N] [--methods hold,homography,flow,bare,carry,depth]
 
 Every Nth frame gives its true labels; the frames between are labelled from them by each method, as the offline pass of
 a replay would with the oracle. Prints mIoU and pixel accuracy (means over the distances), the share covered, the score
@@ -19,7 +19,7 @@ import numpy as np
 
 from stsem.classes import NO_LABEL, Labels
 from stsem.frame import Frame
-from stsem.geometry import carry, flow
+from stsem.geometry import carry, flow, likeness
 from stsem.geometry.carried import Carried
 from stsem.geometry.features import Features, extract
 from stsem.geometry.homography import estimate
@@ -47,6 +47,8 @@ class Walk:
         self.key: tuple[Frame, Labels] | None = None
         self.features: Features | None = None
         self.sources: list[carry.Source] = []
+        self.examples: list[likeness.Examples] = []
+        self.likeness = likeness.remembered([])
         self.chain: flow.Chain | None = None
         self.grey: flow.Grey | None = None
 
@@ -66,8 +68,11 @@ class Walk:
         self.grey = flow.working_grey(frame.image)
         self.chain = flow.Chain.start(self.grey)
         if frame.depth is not None and frame.T_WC is not None and frame.camera is not None:
-            source = carry.Source(View(frame.depth, frame.T_WC, frame.camera), truth).without(self.moving)
-            self.sources = [source, *self.sources[: KEPT - 1]]
+            view = View(frame.depth, frame.T_WC, frame.camera)
+            self.sources = [carry.Source(view, truth).without(self.moving), *self.sources[: KEPT - 1]]
+            examples = likeness.Examples.of(likeness.described(view, frame.image), truth)
+            self.examples = [examples, *self.examples[: KEPT - 1]]
+            self.likeness = likeness.remembered(self.examples)
 
 
 def hold(walk: Walk, frame: Frame) -> Carried:
@@ -100,9 +105,14 @@ def bare(walk: Walk, frame: Frame) -> Carried:
     return Carried(labels, None, labels != NO_LABEL)
 
 
-def depth(walk: Walk, frame: Frame) -> Carried:
+def carried(walk: Walk, frame: Frame) -> Carried:
     rest, view = walk.flowed(frame), _view(frame)
     return rest if view is None else carry.carry(view, walk.sources, rest, moving=walk.moving)
+
+
+def depth(walk: Walk, frame: Frame) -> Carried:
+    answer, view = carried(walk, frame), _view(frame)
+    return answer if view is None else likeness.completed(answer, likeness.described(view, frame.image), walk.likeness)
 
 
 def _view(frame: Frame) -> View | None:
@@ -112,7 +122,8 @@ def _view(frame: Frame) -> View | None:
 
 
 METHODS: dict[str, Callable[[Walk, Frame], Carried]] = {
-    "hold": hold, "homography": homography, "flow": flowed, "bare": bare, "depth": depth,
+    "hold": hold, "homography": homography, "flow": flowed, "bare": bare, "carry": carried,
+    "depth": depth,
 }  # fmt: skip
 
 

@@ -1,0 +1,193 @@
+"""Labels for what no keyframe saw: those of the most similar points that keyframes did see.
+
+Floors, walls and ceilings go on where the image of a keyframe ended, a chair looks like the chair beside it, and a
+person keeps the colour of the clothes. So each point is described by place, direction of the surface and colour, and
+takes the label that its nearest neighbours among the labelled points vote for, a neighbour at the distance d with the
+weight 1 / (d + SOFT) (Dudani 1976). It is a guess, never evidence: what it labels stays uncovered.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from stsem.classes import NO_LABEL, Labels
+from stsem.frame import Image
+from stsem.geometry.carried import Bools, Carried
+from stsem.geometry.reproject import View
+
+Features = npt.NDArray[np.float32]
+"""(..., 9): place in the world, normal of the surface, colour in L*a*b*, each in units of its scale below."""
+
+CELLS = 120
+"""Points along the longer side of an image; a frame is described and guessed in cells, not pixels."""
+EVERY = 2
+"""Every so many cells of a keyframe become examples, along both sides."""
+PLACE_M, NORMAL, COLOUR = 0.5, 0.5, 20.0
+"""What counts as a distance of 1: metres, length of the difference of unit normals, levels of 8-bit L*a*b*."""
+LIGHTNESS = 0.5
+"""Weight of L* against a* and b*: shade tells less than colour."""
+VOTERS = 5
+SOFT = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """What a frame looks like, cell by cell.
+
+    Args:
+        features: (h, w, 9) of the middle of each cell, the colour a mean over the cell.
+        known: (h, w) bool: the middle has depth.
+        side: pixels along a cell; the image may be up to side - 1 pixels wider and higher than all cells.
+    """
+
+    features: Features
+    known: Bools
+    side: int
+
+    def middles(self, values: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+        """(h, w) of `values` (H, W) in the middle of each cell."""
+        height, width = self.known.shape
+        return values[self.side // 2 :: self.side, self.side // 2 :: self.side][:height, :width]
+
+    def spread(self, values: Labels, shape: tuple[int, ...]) -> Labels:
+        """(H, W) `shape` of `values` (h, w): each pixel takes that of its cell, the last ones that of the nearest."""
+        height, width = self.known.shape[0] * self.side, self.known.shape[1] * self.side
+        spread = cv2.resize(values, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
+        below, right = shape[0] - height, shape[1] - width
+        return np.asarray(cv2.copyMakeBorder(spread, 0, below, 0, right, cv2.BORDER_REPLICATE), np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class Examples:
+    """Points of a keyframe with their labels.
+
+    Args:
+        features: (n, 9).
+        labels: (n,) uint8, none of them NO_LABEL.
+    """
+
+    features: Features
+    labels: Labels
+
+    @classmethod
+    def of(cls, cells: Cells, labels: Labels) -> "Examples":
+        """Of a keyframe that looks like `cells`, with `labels` (H, W); persons too, who are told by their colour."""
+        some = np.s_[EVERY // 2 :: EVERY, EVERY // 2 :: EVERY]
+        at = np.asarray(cells.middles(labels), np.uint8)[some]
+        usable = cells.known[some] & (at != NO_LABEL)
+        return cls(cells.features[some][usable], at[usable])
+
+
+@dataclass(frozen=True, eq=False)
+class Likeness:
+    """Examples of any number of keyframes, to be asked for the nearest. The first question builds the search tree."""
+
+    examples: tuple[Examples, ...]
+
+    def classify(self, features: Features) -> tuple[Labels, npt.NDArray[np.float32]]:
+        """Label (n,) and share of the votes (n,) 0..1 for `features` (n, 9); there must be at least one example."""
+        labels = self._labels
+        found = self._tree.query(features, k=np.arange(1, 1 + min(VOTERS, len(labels))))
+        distances, nearest = np.asarray(found[0], np.float64), np.asarray(found[1], np.intp)
+        weights, voted = 1 / (distances + SOFT), labels[nearest]
+        votes = np.zeros((len(features), int(labels.max()) + 1))
+        for weight, label in zip(weights.T, voted.T, strict=True):
+            votes[np.arange(len(features)), label] += weight
+        chosen = votes.argmax(axis=1)
+        shares = votes[np.arange(len(features)), chosen] / weights.sum(axis=1)
+        return chosen.astype(np.uint8), shares.astype(np.float32)
+
+    @cached_property
+    def _labels(self) -> Labels:
+        return np.concatenate([np.empty(0, np.uint8), *(some.labels for some in self.examples)])
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        features = np.concatenate([some.features for some in self.examples])
+        return cKDTree(features, balanced_tree=False, compact_nodes=False)
+
+    def __len__(self) -> int:
+        return len(self._labels)
+
+
+def described(view: View, image: Image) -> Cells:
+    """The cells of a frame.
+
+    Args:
+        view: its depth, pose and camera.
+        image: (H, W, 3) of the size of its depth.
+
+    Raises:
+        ValueError: they differ in size.
+    """
+    height, width = view.depth.shape
+    if image.shape[:2] != (height, width):
+        raise ValueError(f"the image {image.shape[:2]} must have the size of its depth {view.depth.shape}")
+    side = max(1, round(max(height, width) / CELLS))
+    rows, columns = height // side, width // side
+    middle = np.s_[side // 2 :: side, side // 2 :: side]
+    x, y = np.arange(columns) * side + side // 2, np.arange(rows) * side + side // 2
+    depth = view.depth[middle][:rows, :columns]
+    place = _placed(view, x.astype(np.float32)[None, :], y.astype(np.float32)[:, None], depth)
+    colour = cv2.resize(image[: rows * side, : columns * side], (columns, rows), interpolation=cv2.INTER_AREA)
+    lab = cv2.cvtColor(colour, cv2.COLOR_RGB2LAB).astype(np.float32) / np.float32(COLOUR)
+    lab[..., 0] *= np.float32(LIGHTNESS)
+    features = np.concatenate([place / np.float32(PLACE_M), _normals(place) / np.float32(NORMAL), lab], axis=2)
+    known = np.asarray(np.isfinite(place).all(axis=2), np.bool_)
+    return Cells(features, known, side)
+
+
+def completed(answer: Carried, cells: Cells, likeness: Likeness) -> Carried:
+    """`answer` with a guess for what it does not cover; where a cell has no depth, it stays as it is.
+
+    The confidence of a guess is its share of the votes.
+
+    Args:
+        answer: of the size of the frame that `cells` describe.
+        likeness: of the keyframes; without examples, nothing is guessed.
+    """
+    asked = cells.known & ~np.asarray(cells.middles(answer.covered), np.bool_)
+    if not len(likeness) or not asked.any():
+        return answer
+    found, shares = likeness.classify(cells.features[asked])
+    guessed, share = np.full(asked.shape, NO_LABEL, np.uint8), np.zeros(asked.shape, np.float32)
+    guessed[asked], share[asked] = found, shares
+    spread = cells.spread(guessed, answer.labels.shape)
+    here = (spread != NO_LABEL) & ~answer.covered
+    labels, confidence = np.where(here, spread, answer.labels), answer.confidence
+    if confidence is not None:
+        steps = cells.spread(np.rint(share * 255).astype(np.uint8), labels.shape)
+        confidence = np.where(here, steps.astype(np.float32) / np.float32(255), confidence)
+    return Carried(labels, confidence, answer.covered)
+
+
+def remembered(examples: Sequence[Examples]) -> Likeness:
+    """All `examples` of keyframes as one memory."""
+    return Likeness(tuple(examples))
+
+
+def _placed(view: View, x: Features, y: Features, depth: npt.NDArray[np.float32]) -> Features:
+    """(h, w, 3) metres in the world: X = R z K^-1 (u, v, 1) + t; not finite where depth is unknown."""
+    ray = (view.T_WC[:3, :3] @ np.linalg.inv(view.camera.K)).astype(np.float32)
+    known = np.where(depth > 0, depth, np.float32(np.nan))
+    # Written out instead of a matrix product: BLAS may round differently with other thread counts.
+    return np.stack(
+        [(a * x + b * y + c) * known + np.float32(t) for (a, b, c), t in zip(ray, view.T_WC[:3, 3], strict=True)], -1
+    )
+
+
+def _normals(place: Features) -> Features:
+    """(h, w, 3) unit normals, towards the camera; zero where a neighbour is unknown."""
+    if min(place.shape[:2]) < 2:
+        return np.zeros_like(place)
+    down, right = np.gradient(place, axis=0), np.gradient(place, axis=1)
+    (a, b, c), (d, e, f) = np.moveaxis(down, 2, 0), np.moveaxis(right, 2, 0)
+    normal = np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=2)
+    length = np.sqrt((normal * normal).sum(axis=2, keepdims=True))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.nan_to_num(normal / length, nan=0.0, posinf=0.0, neginf=0.0), np.float32)
