@@ -1,9 +1,9 @@
 """Labels for what no keyframe saw: those of the most similar points that keyframes did see.
 
 Floors, walls and ceilings go on where the image of a keyframe ended, a chair looks like the chair beside it, and a
-person keeps the colour of the clothes. So each point is described by place, direction of the surface and colour, and
-takes the label that its nearest neighbours among the labelled points vote for, a neighbour at the distance d with the
-weight 1 / (d + SOFT) (Dudani 1976). It is a guess, never evidence: what it labels stays uncovered.
+person keeps the colour of the clothes. So each point is described by place, height, direction of the surface and
+colour, and takes the label that its nearest neighbours among the labelled points vote for, a neighbour at the distance
+d with the weight 1 / (d + SOFT) (after Dudani 1976). It is a guess, never evidence: what it labels stays uncovered.
 """
 
 from collections.abc import Sequence
@@ -23,11 +23,13 @@ from stsem.geometry.reproject import View
 Features = npt.NDArray[np.float32]
 """(..., 9): place in the world, normal of the surface, colour in L*a*b*, each in units of its scale below."""
 
+Direction = npt.NDArray[np.float64]
+
 CELLS = 120
 """Points along the longer side of an image; a frame is described and guessed in cells, not pixels."""
 EVERY = 2
 """Every so many cells of a keyframe become examples, along both sides."""
-PLACE_M, NORMAL, COLOUR = 0.5, 0.5, 20.0
+PLACE_M, HEIGHT_M, NORMAL, COLOUR = 1.0, 0.3, 0.5, 20.0
 """What counts as a distance of 1: metres, length of the difference of unit normals, levels of 8-bit L*a*b*."""
 LIGHTNESS = 0.5
 """Weight of L* against a* and b*: shade tells less than colour."""
@@ -41,11 +43,13 @@ class Cells:
 
     Args:
         features: (h, w, 9) of the middle of each cell, the colour a mean over the cell.
+        up: (3,) in the world, where the top of the image is.
         known: (h, w) bool: the middle has depth.
         side: pixels along a cell; the image may be up to side - 1 pixels wider and higher than all cells.
     """
 
     features: Features
+    up: Direction
     known: Bools
     side: int
 
@@ -69,10 +73,12 @@ class Examples:
     Args:
         features: (n, 9).
         labels: (n,) uint8, none of them NO_LABEL.
+        up: (3,) in the world, where the top of the image was.
     """
 
     features: Features
     labels: Labels
+    up: Direction
 
     @classmethod
     def of(cls, cells: Cells, labels: Labels) -> "Examples":
@@ -80,19 +86,22 @@ class Examples:
         some = np.s_[EVERY // 2 :: EVERY, EVERY // 2 :: EVERY]
         at = np.asarray(cells.middles(labels), np.uint8)[some]
         usable = cells.known[some] & (at != NO_LABEL)
-        return cls(cells.features[some][usable], at[usable])
+        return cls(cells.features[some][usable], at[usable], cells.up)
 
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """Examples of any number of keyframes, to be asked for the nearest. The first question builds the search tree."""
+    """Examples of any number of keyframes, to be asked for the nearest. The first question builds the search tree.
+
+    Up is the mean over the keyframes, since no log says where it is and cameras are seldom upside down.
+    """
 
     examples: tuple[Examples, ...]
 
     def classify(self, features: Features) -> tuple[Labels, npt.NDArray[np.float32]]:
         """Label (n,) and share of the votes (n,) 0..1 for `features` (n, 9); there must be at least one example."""
         labels = self._labels
-        found = self._tree.query(features, k=np.arange(1, 1 + min(VOTERS, len(labels))))
+        found = self._tree.query(self._with_height(features), k=np.arange(1, 1 + min(VOTERS, len(labels))))
         distances, nearest = np.asarray(found[0], np.float64), np.asarray(found[1], np.intp)
         weights, voted = 1 / (distances + SOFT), labels[nearest]
         votes = np.zeros((len(features), int(labels.max()) + 1))
@@ -109,7 +118,14 @@ class Likeness:
     @cached_property
     def _tree(self) -> cKDTree:
         features = np.concatenate([some.features for some in self.examples])
-        return cKDTree(features, balanced_tree=False, compact_nodes=False)
+        return cKDTree(self._with_height(features), balanced_tree=False, compact_nodes=False)
+
+    def _with_height(self, features: Features) -> Features:
+        """(n, 10)."""
+        x, y, z = np.sum([some.up for some in self.examples], axis=0)
+        scale = PLACE_M / HEIGHT_M / max(float(np.sqrt(x * x + y * y + z * z)), 1e-6)
+        height = features[:, 0] * (scale * x) + features[:, 1] * (scale * y) + features[:, 2] * (scale * z)
+        return np.column_stack([features, height.astype(np.float32)])
 
     def __len__(self) -> int:
         return len(self._labels)
@@ -139,7 +155,7 @@ def described(view: View, image: Image) -> Cells:
     lab[..., 0] *= np.float32(LIGHTNESS)
     features = np.concatenate([place / np.float32(PLACE_M), _normals(place) / np.float32(NORMAL), lab], axis=2)
     known = np.asarray(np.isfinite(place).all(axis=2), np.bool_)
-    return Cells(features, known, side)
+    return Cells(features, -view.T_WC[:3, 1], known, side)
 
 
 def completed(answer: Carried, cells: Cells, likeness: Likeness) -> Carried:

@@ -7,7 +7,18 @@ import pytest
 from stsem.camera import Camera
 from stsem.classes import NO_LABEL
 from stsem.geometry.carried import Carried
-from stsem.geometry.likeness import EVERY, SOFT, VOTERS, Examples, Likeness, completed, described, remembered
+from stsem.geometry.likeness import (
+    EVERY,
+    HEIGHT_M,
+    PLACE_M,
+    SOFT,
+    VOTERS,
+    Examples,
+    Likeness,
+    completed,
+    described,
+    remembered,
+)
 from stsem.geometry.reproject import View
 
 CAMERA = Camera(123, 64, 60.0, 60.0, 61.0, 31.5)
@@ -81,9 +92,12 @@ def test_the_vote_is_that_of_the_nearest_weighted_by_distance() -> None:
     rng = np.random.default_rng(5)
     features, labels = rng.normal(size=(300, 9)).astype(np.float32), rng.integers(0, 4, 300).astype(np.uint8)
     asked = rng.normal(size=(40, 9)).astype(np.float32)
-    halves = [Examples(features[:90], labels[:90]), Examples(features[90:], labels[90:])]
+    up = np.array([0.0, -0.8, 0.6])
+    halves = [Examples(features[:90], labels[:90], up), Examples(features[90:], labels[90:], up)]
     found, shares = remembered(halves).classify(asked)
-    distances = np.linalg.norm(asked[:, None].astype(np.float64) - features, axis=2)
+    apart = asked[:, None].astype(np.float64) - features
+    height = apart[..., :3] @ up * PLACE_M / HEIGHT_M
+    distances = np.sqrt((apart**2).sum(axis=2) + height**2)
     for i, row in enumerate(distances):
         nearest = np.argsort(row)[:VOTERS]
         votes = np.bincount(labels[nearest], 1 / (row[nearest] + SOFT), 4)
