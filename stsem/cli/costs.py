@@ -31,7 +31,7 @@ def measure(
     from stsem.replay.build import build_model, needed_roles
     from stsem.replay.calibrate import measure as calibrate
     from stsem.replay.costing import calibration_frames, subject
-    from stsem.replay.posing import can_map
+    from stsem.replay.posing import can_map, can_track
     from stsem.replay.settings import validated
 
     config = validated(
@@ -40,7 +40,7 @@ def measure(
     with open_log([log]) as opened:
         built, fused = build_model(opened, config), can_map(opened, config)
         frames = calibration_frames(opened, needed_roles(built, config, fused=fused))
-        wanted = subject(opened, config, built, cores=(1, 2), fused=fused)
+        wanted = subject(opened, config, built, cores=(1, 2), fused=fused, track=can_track(opened))
         profile = calibrate(wanted, frames, samples=samples, limit_ns=round(seconds * 1e9))
     profile.save(out)
     for stage, times in profile.samples_ns.items():

@@ -35,6 +35,7 @@ from stsem.report.folder import check_target, folder_name, write_folder
 from stsem.report.terminal import closing_table
 from stsem.search.probe import Probe
 from stsem.search.sustainable import Sustainable, search
+from stsem.stages.track import Tracker
 
 REPORTS = Path("reports")
 
@@ -131,7 +132,7 @@ def _replay(session: Session, annotated: AnnotatedLog | None) -> Context:
     watch = None if annotated is None else lambda mode, result, frame: annotated.answer(mode.name, result, frame)
     with progress(f"Replaying {log.info.name}") as step:
         replayed = replay_log(log, config, model, None if costs is None else costs.of, step, watch)
-    rates = _sustainable(session)
+    rates = _sustainable(session, replayed.runs[0].tracker)
     notes = tuple(
         f"{mode} sustains {found.hz:g} Hz, the highest rate tried; it may sustain more."
         for mode, found in rates.items()
@@ -140,7 +141,7 @@ def _replay(session: Session, annotated: AnnotatedLog | None) -> Context:
     return Context(log, config, model, costs, replayed, {mode: found.hz for mode, found in rates.items()}, notes)
 
 
-def _sustainable(session: Session) -> dict[str, Sustainable]:
+def _sustainable(session: Session, tracker: Tracker | None) -> dict[str, Sustainable]:
     """Mode -> the highest rate it sustains, in frames per second, where that was asked for."""
     log, config, costs = session.log, session.config, session.costing
     if not config.sustainable or costs is None:
@@ -148,7 +149,8 @@ def _sustainable(session: Session) -> dict[str, Sustainable]:
     usable = truth_frames(log) if config.is_oracle else None
     deadline = deadline_ns(config.deadline_ms, log.period_ns, Fraction(1))
     needs = needed_roles(session.model, config, fused=session.fused)
-    probe = Probe(log, config, costs.of, needs=needs, fused=session.fused, usable=usable, patience_ns=deadline)
+    probe = Probe(log, config, costs.of, needs=needs, fused=session.fused, usable=usable, tracker=tracker,
+                  patience_ns=deadline)  # fmt: skip
     return {
         mode.name: search(partial(probe.attempt, mode), capture_hz=1e9 / log.period_ns, deadline_ns=deadline)
         for mode in config.modes

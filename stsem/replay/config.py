@@ -29,6 +29,7 @@ def _number_as_text(value: object) -> object:
 LONGEST_S = 1e9
 """No duration is longer: 31 years fit into integer nanoseconds with room to spare."""
 
+PoseSource = Literal["log", "slam"]
 Switch = Annotated[bool, BeforeValidator(_on_off)]
 Text = Annotated[str, BeforeValidator(_number_as_text)]
 Where: dict[str, JsonValue] = {"where": True}
@@ -63,7 +64,7 @@ class RunConfig(BaseModel):
         1.0, gt=0, le=LONGEST_S, description="paper: longest time between keyframes, seconds."
     )
     propagation: str = Field("homography", description="How frames between keyframes are predicted.")
-    pose: Literal["log", "slam"] = Field(
+    pose: PoseSource = Field(
         "log", description="Where the camera's pose comes from: the log, or 'slam' on colour and depth."
     )
     map: Switch = Field(True, description="Build the labelled map where there is depth and poses.")

@@ -3,12 +3,14 @@
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass, replace
-from typing import Literal
+
+import numpy as np
 
 from stsem.log.log import Loaded, Log
-from stsem.replay.config import RunConfig
+from stsem.pose import Trajectory
+from stsem.replay.config import PoseSource, RunConfig
 
-PoseSource = Literal["log", "slam"]
+MAX_POSE_GAP_NS = 150_000_000
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,21 @@ def can_map(log: Log, config: RunConfig) -> bool:
     source = posing(log, config)
     posed = source.tracks if config.pose == "slam" else log.info.choice.pose is not None
     return config.map and posed and log.info.choice.depth is not None and _is_straight(log)
+
+
+def log_poses(log: Log) -> Trajectory | None:
+    """The log's own poses, interpolated at the stamps of the frames that have one; None without any."""
+    if log.trajectory is None:
+        return None
+    stamps = np.unique(np.fromiter((plan.stamp_ns for plan in log.plans), np.int64, len(log.plans)))
+    found = log.trajectory.brackets(stamps, MAX_POSE_GAP_NS)
+    known = stamps[found.known]
+    return Trajectory(known, log.trajectory.between(known, found.earlier[found.known], found.later[found.known]))
+
+
+def can_track(log: Log) -> bool:
+    """Whether the log has what SLAM takes."""
+    return not _lacking(log)
 
 
 def _lacking(log: Log) -> str:

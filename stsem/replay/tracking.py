@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from stsem.frame import Frame
+from stsem.pose import Trajectory
 from stsem.stages.track import Tracker, Tracking
 
 Then = Callable[[Tracking], None]
@@ -16,6 +17,28 @@ StartTracking = Callable[[Frame, Callable[[], Tracking], Then], None]
 def posed(frame: Frame, tracking: Tracking) -> Frame:
     """The frame with the pose that tracking found; without one when lost."""
     return replace(frame, T_WC=tracking.T_WC)
+
+
+class KnownPoses:
+    """A recorded trajectory in the place of a tracker: what a run would be like with these poses.
+
+    Args:
+        trajectory: of the camera, at the stamps of the frames.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self._trajectory = trajectory
+        self._found: dict[int, Tracking] = {}
+
+    def prepare(self, frame: Frame) -> Callable[[], Tracking]:
+        """See `Tracker.prepare`."""
+        known = self._trajectory.at(frame.stamp_ns, 0)
+        found = self._found[frame.index] = Tracking(None if known is None else known.T_WC, None, ())
+        return lambda: found
+
+    def of(self, index: int) -> Tracking | None:
+        """See `Tracker.of`."""
+        return self._found.get(index)
 
 
 class TrackWorker:

@@ -1,17 +1,18 @@
 """The trajectories of a replay, and how good the one that SLAM found is."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
+from stsem.document.accuracy import Score
 from stsem.document.trajectory import PoseSide, TrajectoryScore
 from stsem.log.log import Log
 from stsem.metrics.trajectory import RelativeErrors, TrajectoryAccuracy, accuracy, associate, umeyama
 from stsem.pose import Trajectory
-from stsem.replay.posing import Posing
+from stsem.replay.posing import Posing, log_poses
 from stsem.stages.track import SlamTracker
-
-MAX_POSE_GAP_NS = 150_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,7 @@ class Trajectories:
 
 def trajectories(log: Log, posing: Posing, tracker: SlamTracker | None) -> Trajectories:
     """Both sources; a frame without a pose is not in its trajectory."""
-    own, found = _of_log(log), None if tracker is None else _of_slam(tracker)
+    own, found = log_poses(log), None if tracker is None else _of_slam(tracker)
     return Trajectories(own, found, found if posing.source == "slam" else own)
 
 
@@ -52,11 +53,19 @@ def side_by_side(found: Trajectories) -> dict[str, Trajectory]:
     return {"log": found.log, "slam": Trajectory(found.slam.stamps_ns, T @ found.slam.poses)}
 
 
-def score(log: Log, posing: Posing, tracker: SlamTracker | None) -> TrajectoryScore | None:
-    """The report's part on the poses used; None where no frame has any."""
+def score(
+    log: Log, posing: Posing, tracker: SlamTracker | None, offline: Mapping[str, Score | None]
+) -> TrajectoryScore | None:
+    """The report's part on the poses used; None where no frame has any.
+
+    Args:
+        log, posing: of the replay.
+        tracker: of the run.
+        offline: source of poses -> offline score of the run with them, where predictions depend on poses.
+    """
     found = trajectories(log, posing, tracker)
     if tracker is not None and found.slam is not None:
-        return _of_tracking(tracker, found.slam, found.log)
+        return _of_tracking(tracker, found.slam, found.log, offline)
     if posing.source == "slam" or found.log is None or not log.plans:
         return None
     posed = sum(plan.pose_log_ns is not None for plan in log.plans)
@@ -79,18 +88,27 @@ def why_not(log: Log, posing: Posing, scored: TrajectoryScore | None) -> dict[st
     return {f"trajectory.{key}": why for key, why in reasons.items() if getattr(scored, key) is None}
 
 
-def _of_tracking(tracker: SlamTracker, slam: Trajectory, log: Trajectory | None) -> TrajectoryScore:
+def _of_tracking(
+    tracker: SlamTracker, slam: Trajectory, log: Trajectory | None, offline: Mapping[str, Score | None]
+) -> TrajectoryScore:
     counts = tracker.counts
-    sides = [PoseSide(pose="slam", poses=len(slam), path_m=_length_m(slam))]
+    sides = [_side("slam", slam, offline.get("slam"))]
     judged = None
     if log is not None and len(log):
-        sides.insert(0, PoseSide(pose="log", used=False, poses=len(log), path_m=_length_m(log)))
+        sides.insert(0, _side("log", log, offline.get("log")))
         judged = accuracy(slam, log, frames_with_depth=counts.with_depth, max_difference_ns=0)
     return TrajectoryScore(
         pose="slam", tracked_share=counts.tracked / counts.with_depth if counts.with_depth else None,
         lost=counts.lost, relocalised=counts.relocalised, keyframes=counts.keyframes, loops=counts.loops,
         sides=tuple(sides), **_errors(judged),
     )  # fmt: skip
+
+
+def _side(pose: Literal["log", "slam"], path: Trajectory, offline: Score | None) -> PoseSide:
+    scored: dict[str, Any] = {} if offline is None else {
+        "offline_miou": offline.miou, "offline_pixel_accuracy": offline.pixel_accuracy, "n": offline.n,
+    }  # fmt: skip
+    return PoseSide(pose=pose, used=pose == "slam", poses=len(path), path_m=_length_m(path), **scored)
 
 
 def _errors(found: TrajectoryAccuracy | None) -> dict[str, float | int]:
@@ -112,16 +130,6 @@ def _relative(name: str, pairs: str, found: RelativeErrors | None) -> dict[str, 
         f"{name}_translation_m": found.translation_m.rmse, f"{name}_rotation_deg": found.rotation_deg.rmse,
         pairs: found.translation_m.n,
     }  # fmt: skip
-
-
-def _of_log(log: Log) -> Trajectory | None:
-    """The log's poses interpolated at the frames' stamps."""
-    if log.trajectory is None:
-        return None
-    stamps = np.unique(np.fromiter((plan.stamp_ns for plan in log.plans), np.int64, len(log.plans)))
-    found = log.trajectory.brackets(stamps, MAX_POSE_GAP_NS)
-    known = stamps[found.known]
-    return Trajectory(known, log.trajectory.between(known, found.earlier[found.known], found.later[found.known]))
 
 
 def _of_slam(tracker: SlamTracker) -> Trajectory:

@@ -2,11 +2,13 @@
 
 import re
 import sys
+from typing import get_args
 
 import pytest
 
 from stsem.cli import main
 from stsem.inference.backends import BACKENDS, PRECISIONS
+from stsem.replay.config import PoseSource
 from stsem.replay.modes import MODES
 from stsem.stages.propagate import PROPAGATIONS
 from stsem.stages.select import POLICIES
@@ -17,6 +19,7 @@ CHOICES = {
     "--keyframes": [spelling for spelling, _ in POLICIES.values()],
     "--backend": list(BACKENDS),
     "--precision": list(PRECISIONS),
+    "--pose": list(get_args(PoseSource)),
 }
 
 

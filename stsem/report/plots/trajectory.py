@@ -22,11 +22,12 @@ def draw(inputs: ReportInputs) -> Figure | None:
     paths = {name: path for name, path in inputs.paths.items() if len(path) > 1}
     if "slam" not in paths:
         return None
-    axes_xy = _level(paths.get("log", paths["slam"]))
+    first = paths.get("log", paths["slam"])
+    origin, directions = first.poses[0, :3, 3], _level(first)
     figure = new_figure(4.2)
     axes = figure.add_subplot()
     for name, path in paths.items():
-        _line(axes, name, path, axes_xy)
+        _line(axes, name, (path.poses[:: 1 + (len(path) - 1) // POINTS, :3, 3] - origin) @ directions)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("Ahead of the first view, m")
     axes.set_ylabel("Left of it, m")
@@ -36,8 +37,8 @@ def draw(inputs: ReportInputs) -> Figure | None:
     return figure
 
 
-def _line(axes: Axes, name: str, path: Trajectory, axes_xy: F64) -> None:
-    points = path.poses[:: 1 + (len(path) - 1) // POINTS, :3, 3] @ axes_xy
+def _line(axes: Axes, name: str, points: F64) -> None:
+    """`points`: (n, 2) metres ahead and to the left."""
     colour, width, opacity = _LINES[name]
     axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=width, alpha=opacity, label=f"{name} poses",
               solid_capstyle="round")  # fmt: skip

@@ -31,24 +31,32 @@ def _sides(document: Document) -> Table | None:
         Column("offline mIoU, %", meaning(PoseSide, "offline_miou")),
         Column("pixel accuracy, %", meaning(PoseSide, "offline_pixel_accuracy")), Column("n", meaning(PoseSide, "n")),
     )  # fmt: skip
-    rows = tuple(_side(run, side) for run in runs if run.trajectory for side in run.trajectory.sides)
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for run in runs:
+        for side in run.trajectory.sides if run.trajectory else ():
+            rows.setdefault(_side(run, side), []).append(run.mode)
     notes = (
-        "The log's poses are the truth that SLAM's are compared with; no stage saw them. "
+        "The log's poses are the truth that SLAM's are compared with; no stage of these runs saw them. "
         f"ATE: {meaning(TrajectoryScore, 'ate_rmse_m')} RPE: {meaning(TrajectoryScore, 'rpe_translation_m')}",
-        *(("Scores by source: only where predictions depend on poses.",) if _scored(runs) else ()),
+        *(
+            ("Scores: where predictions depend on poses; those with the log's poses come from a pass of their own.",)
+            if _scored(runs)
+            else ()
+        ),
     )
-    return Table(columns, rows, notes)
+    return Table(columns, tuple(Row((cells[0], ", ".join(modes), *cells[1:])) for cells, modes in rows.items()), notes)
 
 
-def _side(run: Run, side: PoseSide) -> Row:
+def _side(run: Run, side: PoseSide) -> tuple[str, ...]:
+    """The cells of a row but for the mode."""
     found = run.trajectory if side.used else None
     errors = ("ate_rmse_m", "rpe_translation_m", "rpe_per_metre_translation_m")
-    return Row((
-        side.pose, run.mode, count(side.poses), number(side.path_m, 2),
+    return (
+        side.pose, count(side.poses), number(side.path_m, 2),
         *(NONE if found is None else _plain(name, getattr(found, name)) for name in errors),
         *(NONE if score is None else percent(score) for score in (side.offline_miou, side.offline_pixel_accuracy)),
         count(side.n) if side.n else NONE,
-    ))  # fmt: skip
+    )  # fmt: skip
 
 
 def _scored(runs: list[Run]) -> bool:
