@@ -15,8 +15,8 @@ StartTracking = Callable[[Frame, Callable[[], Tracking], Then], None]
 
 
 def posed(frame: Frame, tracking: Tracking) -> Frame:
-    """The frame with the pose that tracking found; without one when lost."""
-    return replace(frame, T_WC=tracking.T_WC)
+    """The frame with the pose that predictions go by; without one when lost."""
+    return replace(frame, T_WC=tracking.T_OC)
 
 
 class KnownPoses:
@@ -33,7 +33,8 @@ class KnownPoses:
     def prepare(self, frame: Frame) -> Callable[[], Tracking]:
         """See `Tracker.prepare`."""
         known = self._trajectory.at(frame.stamp_ns, 0)
-        found = self._found[frame.index] = Tracking(None if known is None else known.T_WC, None, ())
+        T_WC = None if known is None else known.T_WC
+        found = self._found[frame.index] = Tracking(T_WC, T_WC, None)
         return lambda: found
 
     def of(self, index: int) -> Tracking | None:

@@ -4,9 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+import numpy as np
+
 from stsem.camera import Camera
 from stsem.frame import Frame
-from stsem.pose import Pose
+from stsem.pose import Pose, inverse
 from stsem.slam.system import Placed, Slam
 from stsem.slam.tracker import Status
 
@@ -17,20 +19,14 @@ class Tracking:
 
     Args:
         T_WC: (4, 4) world from camera, metres, the world being the camera of SLAM's first keyframe; None when lost.
+        T_OC: the same in a world that no loop moves: it drifts, but fits the frames just before, whose poses are not
+            corrected either. What is predicted from them goes by it.
         anchor: (SLAM keyframe that it hangs on, T_KC of its camera in it), which no loop changes; None when lost.
-        keyframe_poses: T_WC of SLAM's keyframes as known at this frame; a loop moves them.
     """
 
     T_WC: Pose | None
+    T_OC: Pose | None
     anchor: tuple[int, Pose] | None
-    keyframe_poses: tuple[Pose, ...]
-
-    def now(self, earlier: "Tracking") -> Pose | None:
-        """T_WC of an earlier frame as known at this one: it goes where loops have moved its keyframe."""
-        if earlier.anchor is None:
-            return None
-        keyframe, T_KC = earlier.anchor
-        return self.keyframe_poses[keyframe] @ T_KC
 
 
 @dataclass(frozen=True)
@@ -88,8 +84,8 @@ class SlamTracker:
         self._camera, self._at_once, self._measure = camera, at_once, measure
         self._slam = Slam(camera, seed)
         self._found: dict[int, Tracking] = {}
-        self._poses: tuple[Pose, ...] = ()
-        self._closed = 0
+        self._T_OW: Pose = np.eye(4)
+        self._last: int | None = None
         self._with_depth = self._tracked = self._relocalised = 0
 
     def prepare(self, frame: Frame) -> Callable[[], Tracking]:
@@ -132,13 +128,18 @@ class SlamTracker:
         return self._found[frame.index]
 
     def _track(self, frame: Frame) -> Tracking:
+        closed, before = self._slam.closed, self._slam.keyframe_poses()
         found = self._slam.track(frame)
+        if self._slam.closed != closed and self._last is not None:
+            self._T_OW = self._T_OW @ before[self._last] @ inverse(self._slam.keyframe_poses()[self._last])
         self._with_depth += frame.depth is not None
         self._tracked += frame.depth is not None and found.T_WC is not None
         self._relocalised += found.status is Status.RELOCALISED
-        if found.status is Status.KEYFRAME or self._closed != self._slam.closed:
-            self._poses, self._closed = self._slam.keyframe_poses(), self._slam.closed
-        return Tracking(found.T_WC, self._slam.anchor(frame.index), self._poses)
+        if found.T_WC is None:
+            return Tracking(None, None, None)
+        anchor = self._slam.anchor(frame.index)
+        self._last = None if anchor is None else anchor[0]
+        return Tracking(found.T_WC, self._T_OW @ found.T_WC, anchor)
 
 
 def fitting(frame: Frame, camera: Camera) -> Frame:

@@ -34,7 +34,7 @@ def at(index: int) -> Tracking:
     """The camera is `index` metres along x."""
     T_WC = np.eye(4)
     T_WC[0, 3] = index
-    return Tracking(T_WC, (0, T_WC), (np.eye(4),))
+    return Tracking(T_WC, T_WC, (0, T_WC))
 
 
 @dataclass
@@ -221,4 +221,4 @@ def test_known_poses_stand_in_for_a_tracker() -> None:
     assert known.of(7) is None
     frame = loaded(slots[1]).frame
     assert frame is not None
-    assert posed(frame, found[2]).T_WC is found[2].T_WC
+    assert posed(frame, found[2]).T_WC is found[2].T_OC

@@ -6,8 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stsem.camera import Camera
 from stsem.frame import Frame
-from stsem.pose import inverse
+from stsem.pose import Pose, inverse
+from stsem.slam.tracker import Status, Tracked
+from stsem.stages import track
 from stsem.stages.track import SlamTracker, Tracking, fitting
 from tests.slam.made_up_room import CAMERA, dark, frame, pose
 
@@ -80,13 +83,40 @@ def test_work_waits_where_durations_are_measured(walk: list[Frame]) -> None:
         assert found.T_WC.tobytes() == same.T_WC.tobytes()
 
 
-def test_earlier_frames_go_where_a_loop_moves_their_keyframe() -> None:
-    """T_WC now = the keyframe's pose now times what it hangs on it by."""
-    T_KC, moved = pose(0.0, 0.0, 0.1), pose(3.0, 0.0, 0.0, pan_deg=90.0)
-    earlier = Tracking(T_KC, (1, T_KC), (np.eye(4), np.eye(4)))
-    now = Tracking(np.eye(4), (0, np.eye(4)), (np.eye(4), moved))
-    np.testing.assert_allclose(now.now(earlier), moved @ T_KC)
-    assert now.now(Tracking(None, None, ())) is None
+class LoopAtFrame3:
+    """A SLAM whose only keyframe moves by 2 m along x when frame 3 closes a loop; each frame is 1 m further along z."""
+
+    def __init__(self, camera: Camera, seed: int) -> None:
+        self.closed = self.lost = 0
+        self._poses = (np.eye(4),)
+
+    def track(self, frame: Frame) -> Tracked:
+        """The keyframe's pose times the way from it."""
+        if frame.index == 3:
+            self.closed, self._poses = 1, (pose(2.0, 0.0, 0.0), pose(2.0, 0.0, 3.0))
+        _, T_KC = self.anchor(frame.index)
+        return Tracked(self._poses[0] @ T_KC, Status.TRACKED, 0)
+
+    def anchor(self, index: int) -> tuple[int, Pose]:
+        """On the first keyframe."""
+        return 0, pose(0.0, 0.0, float(index))
+
+    def keyframe_poses(self) -> tuple[Pose, ...]:
+        """As known now."""
+        return self._poses
+
+
+def test_a_loop_moves_the_pose_but_not_what_predictions_go_by(
+    walk: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """T_WC jumps with the map; T_OC goes on as if nothing had happened, so that it fits the keyframes of before."""
+    monkeypatch.setattr(track, "Slam", LoopAtFrame3)
+    tracker = SlamTracker(CAMERA, 0)
+    found = [tracker.prepare(one)() for one in walk[:5]]
+    assert [one.T_WC[:3, 3].tolist() for one in found if one.T_WC is not None] == [
+        [0, 0, 0], [0, 0, 1], [0, 0, 2], [2, 0, 3], [2, 0, 4]
+    ]  # fmt: skip
+    assert [one.T_OC[:3, 3].tolist() for one in found if one.T_OC is not None] == [[0, 0, z] for z in range(5)]
 
 
 def test_slam_gets_no_pose_and_no_depth_of_another_size(walk: list[Frame]) -> None:
