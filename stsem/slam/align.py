@@ -6,6 +6,7 @@ rotation). So several keyframes add up in one system, and the matrix is the info
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +18,13 @@ from stsem.slam.rotations import exponential, logarithm
 F64 = npt.NDArray[np.float64]
 
 SIGMA = 0.01
-"""Standard deviation of a cell's inverse depth, 1/m: noise, quantisation and what calibration leaves."""
+"""Largest standard deviation of a cell's inverse depth, 1/m: noise, quantisation and what calibration leaves."""
 FLOOR_M = 0.0005
 """Added to the standard deviation of the distance to a plane: without it those seen edge-on outweigh all others."""
-HUBER = 2.0
-"""Residuals, in standard deviations, from which a point counts linearly."""
+TUKEY = 4.685
+"""Residuals, in standard deviations as found, from which a point does not count: people walk, doors move."""
+FINEST = 0.1
+"""The least standard deviation that is believed, as a share of SIGMA."""
 GATE = 0.05
 """Relative difference of inverse depth up to which a point may belong to a plane."""
 CORRELATED = 8.0
@@ -45,12 +48,23 @@ class Reference:
     grid: PlaneGrid
 
 
+class Opinion(Protocol):
+    """What else than depth says where the camera is."""
+
+    def system(self, T_WC: Pose) -> tuple[F64, F64]:
+        """Information (6, 6) and gradient (6,) at a pose, as those of `Agreement`."""
+
+
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Another opinion on the pose, and its information (6, 6) in the axes of the camera."""
+    """A pose already known, and its information (6, 6) in the axes of the camera."""
 
     T_WC: Pose
     information: F64
+
+    def system(self, T_WC: Pose) -> tuple[F64, F64]:
+        """Information (6, 6) and gradient (6,) at a pose."""
+        return self.information, self.information @ difference(self.T_WC, T_WC)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +93,7 @@ class Aligned:
 
 
 def align(
-    points: Sequence[tuple[F32, int]], references: Sequence[Reference], start: Pose, prior: Prior | None = None
+    points: Sequence[tuple[F32, int]], references: Sequence[Reference], start: Pose, opinion: Opinion | None = None
 ) -> Aligned:
     """The pose at which points lie on the planes of the references.
 
@@ -87,7 +101,7 @@ def align(
         points: rounds from coarse to fine, ((n, 3) points in the camera, largest number of steps) each.
         references: at least one.
         start: (4, 4) T_WC to begin at.
-        prior: counts where the planes do not say, as along a wall.
+        opinion: counts where the planes do not say, as along a wall.
     """
     pose = start
     for xyz, steps in points:
@@ -95,9 +109,9 @@ def align(
             found = [agreement(xyz, reference, pose) for reference in references]
             information = np.sum([one.information for one in found], axis=0)
             gradient = np.sum([one.gradient for one in found], axis=0)
-            if prior is not None:
-                information = information + prior.information
-                gradient = gradient + prior.information @ difference(prior.T_WC, pose)
+            if opinion is not None:
+                more = opinion.system(pose)
+                information, gradient = information + more[0], gradient + more[1]
             step = -np.linalg.solve(information + np.eye(6), gradient)
             pose = moved(pose, step)
             if np.abs(step).max() < SETTLED:
@@ -120,7 +134,7 @@ def agreement(xyz: F32, reference: Reference, T_WC: Pose) -> Agreement:
     sigma = np.float32(SIGMA) * d * z + np.float32(FLOOR_M)
     residual = n[:, 0] * q[:, 0] + n[:, 1] * q[:, 1] + n[:, 2] * q[:, 2] - d
     size = np.abs(residual) / sigma
-    weight = np.minimum(1, HUBER / np.maximum(size, np.float32(1e-6))) / (sigma * sigma * np.float32(CORRELATED))
+    weight = _biweight(size) / (sigma * sigma * np.float32(CORRELATED))
     normal = n[:, :1] * R[0] + n[:, 1:2] * R[1] + n[:, 2:] * R[2]
     system = _normal_equations(p, normal, residual, weight)
     return Agreement(system[:6, :6], system[:6, 6], len(near) / len(xyz), float(np.median(size)))
@@ -140,6 +154,13 @@ def difference(origin: Pose, pose: Pose) -> F64:
     """(6,) the step in the axes of `pose` that leads from `origin` to it; the inverse of `moved` for small ones."""
     turn = origin[:3, :3].T @ pose[:3, :3]
     return np.concatenate([pose[:3, :3].T @ (pose[:3, 3] - origin[:3, 3]), logarithm(turn[None])[0]])
+
+
+def _biweight(size: F32) -> F32:
+    """Tukey's biweight of residuals over their variance, both in units of SIGMA; their scale is that of the median."""
+    scale = np.float32(np.clip(1.4826 * np.median(size), FINEST, 1.0))
+    inside = np.maximum(np.float32(0), 1 - np.square(size / (np.float32(TUKEY) * scale)))
+    return np.asarray(inside * inside / (scale * scale), np.float32)
 
 
 def _normal_equations(p: F32, n: F32, residual: F32, weight: F32) -> F64:

@@ -49,12 +49,19 @@ class Resection:
     Args:
         T_KC: (4, 4), the camera in that of the keyframe.
         inliers: points that agree with it.
-        matches: points it was estimated from.
+        xyz: (n, 3) matched points in the keyframe, metres.
+        xy: (n, 2) where they are seen, pixels.
     """
 
     T_KC: Pose
     inliers: int
-    matches: int
+    xyz: npt.NDArray[np.float64]
+    xy: npt.NDArray[np.float64]
+
+    @property
+    def matches(self) -> int:
+        """Points it was estimated from."""
+        return len(self.xy)
 
 
 def find_landmarks(image: Image, depth: Depth | None, camera: Camera, *, most: int = MANY) -> Landmarks:
@@ -69,6 +76,13 @@ def find_landmarks(image: Image, depth: Depth | None, camera: Camera, *, most: i
     grain = np.array([width / size[0], height / size[1]], np.float32)
     xy = (np.array([keypoint.pt for keypoint in keypoints], np.float32) + 0.5) * grain - 0.5
     return Landmarks(xy, descriptors.astype(np.uint8, copy=False), _placed(xy, depth, camera))
+
+
+def zoomed(landmarks: Landmarks, ratio: float, depth: Depth | None, camera: Camera) -> Landmarks:
+    """The landmarks with pixels `ratio` times as far from the principal point, placed anew by the depth there."""
+    centre = np.array([camera.cx, camera.cy], np.float32)
+    xy = (landmarks.xy - centre) * np.float32(ratio) + centre
+    return Landmarks(xy, landmarks.descriptors, _placed(xy, depth, camera))
 
 
 def resect(keyframe: Landmarks, current: Landmarks, camera: Camera, *, seed: int) -> Resection | None:
@@ -99,16 +113,16 @@ def resect(keyframe: Landmarks, current: Landmarks, camera: Camera, *, seed: int
         return None
     T_CK = np.eye(4)
     T_CK[:3, :3], T_CK[:3, 3] = cv2.Rodrigues(rvec)[0], tvec.reshape(3)
-    return Resection(inverse(T_CK), len(agreed), len(good)) if np.isfinite(T_CK).all() else None
+    return Resection(inverse(T_CK), len(agreed), xyz, xy) if np.isfinite(T_CK).all() else None
 
 
 def _placed(xy: npt.NDArray[np.float32], depth: Depth | None, camera: Camera) -> npt.NDArray[np.float32]:
     if depth is None:
         return np.full((len(xy), 3), np.nan, np.float32)
-    columns = np.clip(np.rint(xy[:, 0]).astype(np.intp), 0, camera.width - 1)
-    rows = np.clip(np.rint(xy[:, 1]).astype(np.intp), 0, camera.height - 1)
-    z = depth[rows, columns]
-    z = np.where((z > NEAREST_M) & (z < FARTHEST_M), z, np.float32(np.nan))
+    column, row = np.rint(xy[:, 0]).astype(np.intp), np.rint(xy[:, 1]).astype(np.intp)
+    inside = (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+    z = depth[np.where(inside, row, 0), np.where(inside, column, 0)]
+    z = np.where(inside & (z > NEAREST_M) & (z < FARTHEST_M), z, np.float32(np.nan))
     x, y = (xy[:, 0] - camera.cx) / camera.fx * z, (xy[:, 1] - camera.cy) / camera.fy * z
     return np.stack([x, y, z], axis=1).astype(np.float32)
 

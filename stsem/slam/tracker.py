@@ -9,12 +9,14 @@ from stsem.camera import Camera
 from stsem.chance import hash31
 from stsem.frame import Frame
 from stsem.pose import Pose, inverse
-from stsem.slam.align import Agreement, Aligned, Prior, Reference, agreement, align
+from stsem.slam.align import Agreement, Aligned, agreement, align
 from stsem.slam.keyframe import Keyframe, is_far
-from stsem.slam.landmarks import FEW, MANY, Landmarks, Resection, find_landmarks, resect
-from stsem.slam.planes import F32, PlaneGrid, plane_grid
+from stsem.slam.landmarks import FEW, MANY, Landmarks, Resection, find_landmarks, resect, zoomed
+from stsem.slam.planes import PlaneGrid, plane_grid
 from stsem.slam.posegraph import Edge
 from stsem.slam.recognise import most_alike
+from stsem.slam.sighting import Sighting, sighting
+from stsem.slam.zoom import Zoom
 
 MAX_TRANSLATION_M, MAX_ROTATION_DEG, MIN_KEYFRAME_SHARE = 0.15, 12.0, 0.6
 """A frame farther from its keyframe, or that sees less of it, becomes a keyframe."""
@@ -29,8 +31,12 @@ MIN_RELOCALISED_INLIERS = 12
 MIN_RELOCALISED_SHARE = 0.5
 MIN_POINTS = 500
 """Cells with a plane below which a frame counts as without depth."""
-POINT_SIGMAS = np.array([0.03] * 3 + [0.02] * 3)
-"""Metres and radians by which PnP may err where colour and depth are not well registered."""
+MIN_SIGHTED = 12
+"""Points that are heard in the alignment of depth."""
+SURE_INFORMATION = 5e4
+"""Depth that leaves less than 4.5 mm and rad in the worst direction alone shows how colour and depth are registered."""
+ZOOM_STEP = 0.002
+"""Change of the ratio of focal lengths that is worth placing all landmarks anew."""
 CANDIDATES = 3
 MAX_WEIGHT, MEMORY = 30.0, 30.0
 
@@ -95,13 +101,16 @@ class Tracker:
         self._current = 0
         self._T_KC: Pose | None = None
         self._velocity: Pose = np.eye(4)
+        self._zoom, self._ratio = Zoom(), 1.0
 
     def track(self, frame: Frame) -> Tracked:
         """The pose of `frame`, measured against the current keyframe, or found again among all of them."""
         view = self._view(frame)
         if not self.keyframes:
             return self._begin(view)
-        return self._relocalise(view) if self._T_KC is None else self._follow(view, self._T_KC)
+        found = self._relocalise(view) if self._T_KC is None else self._follow(view, self._T_KC)
+        self._rezoomed()
+        return found
 
     def move(self, poses: list[Pose]) -> None:
         """Gives the keyframes the poses (one each, T_WC) that a pose graph found; tracking goes on from there."""
@@ -109,10 +118,14 @@ class Tracker:
 
     def _view(self, frame: Frame) -> _View:
         most = MANY if self._T_KC is None else FEW
-        landmarks = find_landmarks(frame.image, frame.depth, self._camera, most=most)
+        landmarks = self._landmarks(frame, most)
         grid = None if frame.depth is None else plane_grid(frame.depth, self._camera)
         enough = grid is not None and np.count_nonzero(grid.planes[:, 4]) >= MIN_POINTS
         return _View(frame, landmarks, grid if enough else None)
+
+    def _landmarks(self, frame: Frame, most: int) -> Landmarks:
+        found = find_landmarks(frame.image, frame.depth, self._camera, most=most)
+        return found if self._ratio == 1.0 else zoomed(found, self._ratio, frame.depth, self._camera)
 
     def _begin(self, view: _View) -> Tracked:
         if view.grid is None:
@@ -126,10 +139,10 @@ class Tracker:
         predicted = keyframe.T_WC @ T_KC @ self._velocity
         if view.grid is None:
             return self._by_points(view, keyframe, seen)
-        found = _refined(view.grid, keyframe, seen, predicted)
+        found, points = self._refined(view.grid, keyframe, seen, predicted)
         if reason := _doubt(found.agreement, seen):
             return self._lose(reason)
-        return self._accept(view, found, seen, Status.TRACKED)
+        return self._accept(view, found, seen, points, Status.TRACKED)
 
     def _by_points(self, view: _View, keyframe: Keyframe, seen: Resection | None) -> Tracked:
         if seen is None or seen.inliers < MIN_INLIERS:
@@ -146,13 +159,50 @@ class Tracker:
             seen = resect(keyframe.landmarks, view.landmarks, self._camera, seed=self._draw(view, position))
             if seen is None or seen.inliers < MIN_RELOCALISED_INLIERS:
                 continue
-            found = _refined(view.grid, keyframe, seen, keyframe.T_WC @ seen.T_KC)
+            found, points = self._refined(view.grid, keyframe, seen, keyframe.T_WC @ seen.T_KC)
             if found.agreement.share >= MIN_RELOCALISED_SHARE and not _doubt(found.agreement, seen):
                 self._current, self._T_KC = position, inverse(keyframe.T_WC) @ found.T_WC
-                return self._accept(view, found, seen, Status.RELOCALISED)
+                return self._accept(view, found, seen, points, Status.RELOCALISED)
         return self._lose("lost, and no keyframe recognised")
 
-    def _accept(self, view: _View, found: Aligned, seen: Resection | None, status: Status) -> Tracked:
+    def _refined(
+        self, grid: PlaneGrid, keyframe: Keyframe, seen: Resection | None, predicted: Pose
+    ) -> tuple[Aligned, Sighting | None]:
+        """By depth and points at once, from whichever start meets more of the keyframe's surface; and those points."""
+        likely = [predicted]
+        if seen is not None and seen.inliers >= MIN_INLIERS:
+            few = grid.points(4)
+            likely.append(keyframe.T_WC @ seen.T_KC)
+            likely.sort(key=lambda pose: -agreement(few, keyframe.reference, pose).share)
+        points = None if seen is None else sighting(seen, keyframe.T_WC, self._camera, likely, self._zoom.spread)
+        if points is not None and len(points.xy) < MIN_SIGHTED:
+            points = None
+        found = align([(grid.points(2), 4), (grid.points(), 2)], [keyframe.reference], likely[0], points)
+        if points is not None and not self._zoom.settled:
+            self._learn_zoom(grid, keyframe, points, found)
+        return found, points
+
+    def _learn_zoom(self, grid: PlaneGrid, keyframe: Keyframe, points: Sighting, found: Aligned) -> None:
+        """Compares the flow of points with the motion that depth finds without them, where that is sure."""
+        alone = align([(grid.points(2), 4)], [keyframe.reference], found.T_WC)
+        if float(np.linalg.eigvalsh(alone.agreement.information)[0]) < SURE_INFORMATION:
+            return
+        before = points.errors(keyframe.T_WC)[1] + points.xy
+        expected = points.errors(alone.T_WC)[1] + points.xy - before
+        self._zoom.add(expected, (points.xy - before) / self._ratio)
+
+    def _rezoomed(self) -> None:
+        """Takes the ratio of focal lengths as it is known now, and places all landmarks by it."""
+        change = self._zoom.ratio / self._ratio
+        if abs(change - 1) > ZOOM_STEP:
+            self._ratio = self._zoom.ratio
+            self.keyframes = [
+                replace(one, landmarks=zoomed(one.landmarks, change, one.depth, self._camera)) for one in self.keyframes
+            ]
+
+    def _accept(
+        self, view: _View, found: Aligned, seen: Resection | None, points: Sighting | None, status: Status
+    ) -> Tracked:
         assert view.grid is not None
         keyframe, share = self.keyframes[self._current], found.agreement.share
         T_KC = inverse(keyframe.T_WC) @ found.T_WC
@@ -162,13 +212,13 @@ class Tracker:
         pose, inliers, matches = found.T_WC, seen.inliers if seen else 0, seen.matches if seen else 0
         far = is_far(T_KC, max_translation_m=MAX_TRANSLATION_M, max_rotation_deg=MAX_ROTATION_DEG)
         if status is Status.TRACKED and (far or share < MIN_KEYFRAME_SHARE):
-            pose, status = self._promote(view, view.grid, found.T_WC), Status.KEYFRAME
+            pose, status = self._promote(view, view.grid, found.T_WC, points), Status.KEYFRAME
         else:
             grid = keyframe.grid.blended(view.grid, T_KC, max_weight=MAX_WEIGHT, memory=1.0)
             self.keyframes[self._current] = replace(keyframe, grid=grid)
         return Tracked(pose, status, self._current, inliers, matches, share)
 
-    def _promote(self, view: _View, grid: PlaneGrid, T_WC: Pose) -> Pose:
+    def _promote(self, view: _View, grid: PlaneGrid, T_WC: Pose, seen: Sighting | None) -> Pose:
         """Makes the frame a keyframe: aligned to its neighbours all at once, with an edge to each. Returns its pose."""
         coarse = grid.points(4)
         shares = [agreement(coarse, one.reference, T_WC).share for one in self.keyframes]
@@ -176,9 +226,12 @@ class Tracker:
         chosen = [int(one) for one in best if shares[one] >= MIN_SHARE or one == self._current]
         references = [self.keyframes[one].reference for one in chosen]
         points = grid.points()
-        pose = align([(points, 6)], references, T_WC).T_WC
+        pose = align([(points, 6)], references, T_WC, seen).T_WC
         for position, reference in zip(chosen, references, strict=True):
-            self.edges.append(_edge(position, len(self.keyframes), points, reference, pose))
+            information = agreement(points, reference, pose).information + np.eye(6)
+            if seen is not None and position == self._current:
+                information = information + seen.system(pose)[0]
+            self.edges.append(Edge(position, len(self.keyframes), inverse(reference.T_WC) @ pose, information))
         last = self.keyframes[self._current]
         known = grid.blended(last.grid, inverse(pose) @ last.T_WC, max_weight=MAX_WEIGHT, memory=MEMORY)
         self._add(view, known, pose)
@@ -187,7 +240,7 @@ class Tracker:
     def _add(self, view: _View, grid: PlaneGrid, T_WC: Pose) -> None:
         frame = view.frame
         assert frame.depth is not None
-        landmarks = find_landmarks(frame.image, frame.depth, self._camera, most=MANY)
+        landmarks = self._landmarks(frame, MANY)
         self.keyframes.append(Keyframe(frame.index, frame.stamp_ns, T_WC, landmarks, frame.depth, grid))
         self._current, self._T_KC = len(self.keyframes) - 1, np.eye(4)
 
@@ -203,18 +256,6 @@ def _lost(reason: str) -> Tracked:
     return Tracked(None, Status.LOST, None, reason=reason)
 
 
-def _refined(grid: PlaneGrid, keyframe: Keyframe, seen: Resection | None, predicted: Pose) -> Aligned:
-    """By depth, from whichever start meets more of the keyframe's surface; the points count where depth is silent."""
-    coarse, start, prior = grid.points(2), predicted, None
-    if seen is not None and seen.inliers >= MIN_INLIERS:
-        by_points = keyframe.T_WC @ seen.T_KC
-        prior = Prior(by_points, np.diag(POINT_SIGMAS**-2.0))
-        few = grid.points(4)
-        at_points, at_predicted = (agreement(few, keyframe.reference, pose) for pose in (by_points, predicted))
-        start = by_points if at_points.share > at_predicted.share else predicted
-    return align([(coarse, 4), (grid.points(), 2)], [keyframe.reference], start, prior)
-
-
 def _doubt(found: Agreement, seen: Resection | None) -> str:
     """Why an alignment is not believed; "" if it is."""
     if found.share < MIN_SHARE or found.residual > MAX_RESIDUAL:
@@ -223,9 +264,3 @@ def _doubt(found: Agreement, seen: Resection | None) -> str:
     if not certain and (seen is None or seen.inliers < MIN_INLIERS):
         return "too few points seen again, and depth alone does not fix the pose"
     return ""
-
-
-def _edge(first: int, second: int, points: F32, reference: Reference, T_WC: Pose) -> Edge:
-    """What depth alone says about the motion from a keyframe to the camera at `T_WC`."""
-    alone = align([(points, 3)], [reference], T_WC)
-    return Edge(first, second, inverse(reference.T_WC) @ alone.T_WC, alone.agreement.information)
