@@ -7,6 +7,7 @@ minute for each speed profile, and from frame to frame of each LOG.
 """
 
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,18 +19,21 @@ from stsem.synth.office import build_office
 from stsem.synth.path import PROFILES, pose_at, profile, walk
 
 
+furnished = cache(build_office)
+
+
 def rates(poses: list[Pose], times_s: np.ndarray) -> np.ndarray:
     """(n - 1,) degrees per second between neighbours, by the trace of the rotation."""
     turns = np.stack(poses)[:, :3, :3]
     trace = np.einsum("nij,nij->n", turns[:-1], turns[1:])
-    return np.degrees(np.arccos(((trace - 1) / 2).clip(-1, 1))) / np.diff(times_s)
+    return np.asarray(np.degrees(np.arccos(((trace - 1) / 2).clip(-1, 1))) / np.diff(times_s))
 
 
 def walked(name: str) -> np.ndarray:
     found = []
     for seed in range(12):
         layout, times = 100 + seed, np.arange(0, 60, 0.1)
-        states = walk(build_office(layout), chance.hash31(seed, "walk", layout), 60, profile(name))
+        states = walk(furnished(layout), chance.hash31(seed, "walk", layout), 60, profile(name))
         found.append(rates([pose_at(states, float(time)) for time in times], times))
     return np.concatenate(found)
 
