@@ -18,7 +18,6 @@ from stsem.pose import Pose
 from stsem.synth.office import build_office
 from stsem.synth.path import PROFILES, pose_at, profile, walk
 
-
 furnished = cache(build_office)
 
 
