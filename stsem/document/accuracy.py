@@ -77,6 +77,12 @@ class DistanceRow(Part):
     """Pixel accuracy of the frames at this distance. Fraction."""
     n: Count = 0
     """Scored frames at this distance."""
+    covered: Share = None
+    """Share of the scored pixels that rest on evidence; null where the method does not say. Fraction."""
+    covered_miou: Share = None
+    """mIoU over those pixels alone. Fraction."""
+    covered_pixel_accuracy: Share = None
+    """Pixel accuracy over those pixels alone. Fraction."""
 
 
 class DistanceSummary(Part):

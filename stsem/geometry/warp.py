@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from stsem.classes import NO_LABEL, Labels
+from stsem.classes import NO_LABEL, Bools, Labels
 from stsem.geometry.homography import Matrix3
 from stsem.uncertainty import Confidence
 
@@ -29,6 +29,12 @@ def warp_confidence(confidence: Confidence, H: Matrix3, size: tuple[int, int]) -
     """The confidence (H, W) that goes with labels, moved as `warp_labels` moves them; 0 where the keyframe ends."""
     warped = cv2.warpPerspective(confidence, H, size, flags=cv2.INTER_NEAREST, borderValue=0)
     return np.asarray(warped, np.float32)
+
+
+def warp_covered(shape: tuple[int, ...], H: Matrix3, size: tuple[int, int]) -> Bools:
+    """(H, W) bool for an image of `size` (width, height): where a keyframe of `shape` (H, W) reaches."""
+    warped = cv2.warpPerspective(np.ones(shape, np.uint8), H, size, flags=cv2.INTER_NEAREST, borderValue=0)
+    return np.asarray(warped, np.uint8).view(np.bool_)
 
 
 def warp_onto(background: npt.NDArray[Value], labels: npt.NDArray[Value], H: Matrix3) -> npt.NDArray[Value]:

@@ -11,10 +11,15 @@ from stsem.errors import EXIT_FINE, EXIT_LOSSY, EXIT_NOTHING_MEASURED
 from stsem.inference.backends import BACKENDS
 from stsem.inference.cpu import cpu_features
 from stsem.log.log import Log
+from stsem.replay.build import policy_of
+from stsem.replay.calibrate import registers
 from stsem.replay.comparison import Contender, compare
 from stsem.replay.engine import Replayed
 from stsem.replay.runs import Context, Found, part, scored, without_scores
+from stsem.stages.propagate import PROPAGATIONS
 
+_UNNAMED = "homography"
+"""What profiles were measured with that do not name the method."""
 _PACKAGES = ("mcap", "numpy", "onnxruntime", "opencv-python-headless")
 
 
@@ -175,8 +180,26 @@ def _foreign_costs(context: Context) -> list[str]:
     ]
 
 
+def _other_method(context: Context) -> list[str]:
+    """That the durations between keyframes are those of another method, or that nobody knows of which."""
+    profile, config = None if context.costing is None else context.costing.profile, context.config
+    if profile is None or all(mode.segments_every_frame for mode in config.modes):
+        return []
+    needs = PROPAGATIONS[config.propagation].needs
+    ran = config.propagation, registers(policy_of(config).needs_homography, needs)
+    measured = profile.made_for.get("propagation", _UNNAMED), profile.made_for.get("register", ran[1])
+    if measured == ran:
+        return []
+    return [
+        f"The cost profile was measured with --propagation {measured[0]} (register: {measured[1]}), but the run used "
+        f"{ran[0]} (register: {ran[1]}): the durations of `register` and `propagate` are the former's."
+    ]
+
+
 def _warnings(context: Context) -> tuple[str, ...]:
     found = [*map(str, context.log.info.warnings), *context.notes]
+    if sentence := context.replayed.posing.sentence:
+        found.append(sentence)
     found += [
         f"{run.mode.name} answered no frame before its run ended: the jobs last too long for this log."
         for run in context.replayed.runs
@@ -191,7 +214,7 @@ def _warnings(context: Context) -> tuple[str, ...]:
     costing = context.costing
     if costing is not None and costing.profile is not None and costing.profile.disturbed:
         found.append("The cost profile was measured while other work held a core; its durations are too long.")
-    found += _foreign_costs(context)
+    found += _foreign_costs(context) + _other_method(context)
     if context.config.costs == "measured" and context.config.clock == "real-time":
         found.append("Durations were measured as they happened on this machine: timing does not repeat.")
     return tuple(found)

@@ -10,13 +10,16 @@ from stsem.log.log import Loaded
 from stsem.replay.answer import AnswerRule, with_answer
 from stsem.replay.queues import Mailbox
 from stsem.replay.schedule import Slot, watermarks
+from stsem.replay.tracking import Decoding, TrackWorker, posed
 from stsem.replay.waiting import WaitingRoom
 from stsem.result import STAGES, FrameResult, Outcome, Span
 from stsem.sim.cores import CorePool, Job
 from stsem.sim.costs import CostSource
 from stsem.sim.events import EventQueue, Priority
 from stsem.stages.fuse import Fuser
+from stsem.stages.propagation.method import Predicted
 from stsem.stages.register import Registration
+from stsem.stages.track import Tracker, Tracking
 
 T = TypeVar("T")
 
@@ -71,6 +74,8 @@ class Machine:
         fuse: the map beside the path; None without one.
         count_decode: whether decoding is a job on the path (`--count-decode`); the work itself is done before.
         reload: loads a frame again that had to wait long; None keeps every waiting frame in memory.
+        tracker: finds the poses; None where the log gives them.
+        pose_on_path: whether an answer needs the pose that `tracker` finds, so that `track` lies on the path.
     """
 
     cores: int
@@ -80,6 +85,8 @@ class Machine:
     fuse: Fuser | None = None
     count_decode: bool = False
     reload: Callable[[int], Loaded] | None = None
+    tracker: Tracker | None = None
+    pose_on_path: bool = False
 
 
 @dataclass(eq=False)
@@ -109,6 +116,9 @@ class RealTimeRun:
         self._pool = CorePool(self._queue, machine.cores)
         self._pushed = 0
         self._state = _State(WaitingRoom(machine.reload))
+        self._decoding = Decoding(self._decode if machine.count_decode else None)
+        first = min((slot.index for slot in slots), default=0)
+        self._track = None if machine.tracker is None else TrackWorker(machine.tracker, first, self._start_tracking)
 
     @property
     def spans(self) -> Sequence[Span]:
@@ -119,6 +129,8 @@ class RealTimeRun:
         """The next frame of the log."""
         slot, mark = self._slots[self._pushed], self._marks[self._pushed]
         self._pushed += 1
+        if self._track is not None and loaded.frame is not None and not slot.missing:
+            self._track.prepare(loaded.frame)
         self._queue.schedule(slot.arrival_ns, Priority.ARRIVAL, lambda: self._arrive(slot, loaded))
         if mark - 1 > self._queue.now_ns:
             self._queue.run_until(mark - 1)
@@ -138,6 +150,8 @@ class RealTimeRun:
 
     def _arrive(self, slot: Slot, loaded: Loaded) -> None:
         self._judge.arrived(slot, loaded, self._state.newest)
+        if self._track is not None:
+            self._track.arrive(slot.index, None if slot.missing else loaded.frame)
         if loaded.frame is None:
             self._end(slot, loaded, Outcome.UNDECODABLE, reason="" if loaded.error is None else loaded.error.reason)
         elif slot.missing:
@@ -160,8 +174,15 @@ class RealTimeRun:
             raise ValueError(f"frame {index} has no image and cannot be taken")
         task = _Task(self._slot(index), loaded, loaded.frame, self._queue.now_ns)
         self._state.task = task
-        if self._machine.count_decode:
-            self._submit(task.frame, "decode", 1, lambda: None, lambda _: self._register(task))
+        self._decoding.before(task.frame, lambda: self._locate(task))
+
+    def _locate(self, task: _Task) -> None:
+        def go_on(tracking: Tracking) -> None:
+            task.frame = posed(task.frame, tracking)
+            self._register(task)
+
+        if self._track is not None and self._machine.pose_on_path:
+            self._track.after(task.slot.index, go_on)
         else:
             self._register(task)
 
@@ -188,12 +209,18 @@ class RealTimeRun:
         elif self._rule.source is None:
             self._answer(task, Outcome.NO_SOURCE, None, None)
         else:
-            source = self._rule.source.index
             propagate = self._rule.propagate
             self._submit(
                 task.frame, "propagate", 1, lambda: propagate(task.frame, task.registration),
-                lambda answer: self._answer(task, Outcome.PROPAGATED, answer, source),
+                lambda found: self._predicted(task, found),
             )  # fmt: skip
+
+    def _predicted(self, task: _Task, found: Predicted | None) -> None:
+        if found is None:
+            self._answer(task, Outcome.NO_SOURCE, None, None)
+        else:
+            task.reason = found.remark
+            self._answer(task, Outcome.PROPAGATED, found.answer, found.keyframe)
 
     def _segmented(self, task: _Task, answer: Segmentation | None) -> None:
         if answer is None:
@@ -201,10 +228,22 @@ class RealTimeRun:
             self._answer(task, Outcome.NO_SOURCE, None, None)
             return
         self._rule.finish(task.frame, answer)
-        fuse = self._machine.fuse
-        if fuse is not None and fuse.can_fuse(task.frame):
-            self._submit(task.frame, "fuse", 1, lambda: fuse(task.frame, answer), lambda _: None)
+        if self._track is None:
+            self._fuse(task.frame, answer)
+        else:
+            self._track.after(task.slot.index, lambda tracking: self._fuse(posed(task.frame, tracking), answer))
         self._answer(task, Outcome.SEGMENTED, answer, task.slot.index)
+
+    def _fuse(self, frame: Frame, answer: Segmentation) -> None:
+        fuse = self._machine.fuse
+        if fuse is not None and fuse.can_fuse(frame):
+            self._submit(frame, "fuse", 1, lambda: fuse(frame, answer), lambda _: None)
+
+    def _decode(self, frame: Frame, then: Callable[[], None]) -> None:
+        self._submit(frame, "decode", 1, lambda: None, lambda _: then())
+
+    def _start_tracking(self, frame: Frame, work: Callable[[], Tracking], then: Callable[[Tracking], None]) -> None:
+        self._decoding.before(frame, lambda: self._submit(frame, "track", 1, work, then))
 
     def _answer(self, task: _Task, outcome: Outcome, answer: Segmentation | None, source: int | None) -> None:
         self._state.task = None

@@ -1,6 +1,6 @@
 """Sections about how right the answers are."""
 
-from stsem.document.accuracy import Consistency, DistanceSummary, Loss, Score
+from stsem.document.accuracy import Consistency, DistanceRow, DistanceSummary, Loss, Score
 from stsem.document.schema import Comparison, Document, Run
 from stsem.report.metrics import METRICS, no_intervals, row_delta, row_name, row_reading, row_value, shown
 from stsem.report.outline import Block, Column, Figure, Folded, Row, Section, Table, Text
@@ -90,6 +90,8 @@ def distance_section(document: Document) -> Section | None:
     for run in runs:
         if run.by_distance_summary:
             blocks.append(Text(_summary(run, run.by_distance_summary)))
+        if said := _evidence(run):
+            blocks.append(Text(said))
         blocks.append(Folded(f"By distance, {run.mode}", (_distances(run),)))
     return Section("By distance to the keyframe", tuple(blocks))
 
@@ -102,14 +104,33 @@ def _summary(run: Run, summary: DistanceSummary) -> str:
     )
 
 
+def _evidence(run: Run) -> str:
+    """What predicted answers rest on, and what they had to do without; "" where nobody says."""
+    said = [] if run.covered is None else [f"{percent(run.covered)} % of the pixels of predicted answers are covered"]
+    said += [f"{plural(frames, 'frame')} predicted with {what}" for what, frames in run.remarks.items()]
+    return f"`{run.mode}`: {'; '.join(said)}." if said else ""
+
+
 def _distances(run: Run) -> Table:
-    columns = (Column("frames"), Column("ms"), Column("mIoU, %"), Column("pixel accuracy, %"), Column("n"))
-    rows = tuple(
-        Row((str(row.frames), number(row.ms, 0), percent(row.miou), percent(row.pixel_accuracy),
-             count(row.n) + ("" if row.n >= ENOUGH else " (few)")))
-        for row in run.by_distance
+    told = any(row.covered is not None for row in run.by_distance)
+    columns = (
+        Column("frames"), Column("ms"), Column("mIoU, %"), Column("pixel accuracy, %"),
+        *((Column("covered, %"), Column("there: mIoU, %"), Column("there: pixel accuracy, %")) if told else ()),
+        Column("n"),
     )  # fmt: skip
-    return Table(columns, rows, ("Offline pass. Distance 0 is the keyframe itself; ms: median of capture time.",))
+    rows = tuple(Row(_distance_cells(row, told)) for row in run.by_distance)
+    notes = ["Offline pass. Distance 0 is the keyframe itself; ms: median of capture time."]
+    if told:
+        notes.append(f"Covered: {meaning(DistanceRow, 'covered')}")
+    return Table(columns, rows, tuple(notes))
+
+
+def _distance_cells(row: DistanceRow, told: bool) -> tuple[str, ...]:
+    covered = (percent(row.covered), percent(row.covered_miou), percent(row.covered_pixel_accuracy))
+    return (
+        str(row.frames), number(row.ms, 0), percent(row.miou), percent(row.pixel_accuracy),
+        *(covered if told else ()), count(row.n) + ("" if row.n >= ENOUGH else " (few)"),
+    )  # fmt: skip
 
 
 def classes_section(document: Document) -> Section | None:

@@ -1,0 +1,90 @@
+"""Depth: the exact warp by depth and pose from the newest keyframes that saw each point; the rest by flow."""
+
+import numpy as np
+
+from stsem.classes import ClassSet
+from stsem.frame import Frame, Segmentation
+from stsem.geometry.carried import Carried
+from stsem.geometry.carry import Source, carry, moving_classes
+from stsem.geometry.reproject import Rows, View, among
+from stsem.stages.keyframe import Keyframe, view_of
+from stsem.stages.propagation.flow import Flow
+from stsem.stages.propagation.method import Needs, Predicted
+from stsem.stages.register import Registration
+
+KEPT = 32
+"""Keyframes remembered: up to 9 bytes a pixel each, 149 MB in all at 960x540."""
+SAMPLES = 2048
+"""Pixels by which the coverage of a frame is foretold."""
+NO_SPACE = "no depth or pose: by flow"
+
+
+class DepthWarp:
+    """Asks up to `KEPT` finished keyframes, the newest first; persons, and what none of them saw, come by flow.
+
+    A frame without depth, pose or camera is predicted by flow alone; a keyframe without them is not asked.
+
+    Args:
+        classes: of the labels: which of them move by themselves is told by name.
+    """
+
+    needs = Needs(follows=True, space=True)
+
+    def __init__(self, classes: ClassSet) -> None:
+        self._moving = moving_classes(classes)
+        self._flow = Flow()
+        self._sources: tuple[tuple[int, Source], ...] = ()
+
+    def see(self, frame: Frame, registration: Registration) -> None:
+        """See `Flow.see`."""
+        self._flow.see(frame, registration)
+
+    def selected(self, frame: Frame, registration: Registration | None) -> None:
+        """See `Flow.selected`."""
+        self._flow.selected(frame, registration)
+
+    def finished(self, keyframe: Keyframe) -> None:
+        """Remembered with its depth; the oldest one makes room."""
+        if keyframe.view is None:
+            return
+        answer = keyframe.segmentation
+        source = Source(keyframe.view, answer.labels, answer.confidence).without(self._moving)
+        newest_first = sorted([(keyframe.stamp_ns, source), *self._sources], key=lambda pair: -pair[0])
+        self._sources = tuple(newest_first[:KEPT])
+
+    def forgotten(self, index: int) -> None:
+        """Its chain is let go; its depth and labels stay."""
+        self._flow.forgotten(index)
+
+    def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
+        """By depth where a keyframe saw the point, else by flow from the newest."""
+        by_flow, view = self._flow.predict(source, frame, registration), view_of(frame)
+        if view is None:
+            return Predicted(by_flow.answer, source.index, NO_SPACE)
+        answer = by_flow.answer
+        covered = np.zeros(answer.labels.shape, np.bool_) if answer.covered is None else answer.covered
+        rest = Carried(answer.labels, answer.confidence, covered)
+        found = carry(view, [source for _, source in self._sources], rest, moving=self._moving)
+        return Predicted(Segmentation(found.labels, found.confidence, covered=found.covered), source.index)
+
+    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
+        """The share of some pixels that any keyframe saw; by flow for a frame without depth. Persons are left out."""
+        view = view_of(frame)
+        if view is None:
+            return self._flow.expected_coverage(source, frame, registration)
+        rows = _spread(view.depth.size)
+        known = rows[view.depth.reshape(-1)[rows] > 0]
+        return self._seen(view, known) / max(1, len(rows))
+
+    def _seen(self, view: View, rows: Rows) -> int:
+        """How many of the pixels `rows` a keyframe saw."""
+        left = rows
+        for _, source in self._sources:
+            pairs = among(view, source.view, left, beside=False)
+            left = left[~pairs.found.reshape(-1)[: len(left)]]
+        return len(rows) - len(left)
+
+
+def _spread(size: int) -> Rows:
+    """SAMPLES of `size` pixels, spread by the golden ratio: a grid would fall into step with the rows of the image."""
+    return (np.arange(SAMPLES) * 0.6180339887498949 % 1 * size).astype(np.intp)

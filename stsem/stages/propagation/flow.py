@@ -1,0 +1,62 @@
+"""Flow: dense inverse search from frame to frame, chained back to the keyframe."""
+
+import numpy as np
+
+from stsem.frame import Frame, Segmentation
+from stsem.geometry.flow import PRESET, Chain, Grey, backward_flow, working_grey
+from stsem.stages.keyframe import Keyframe
+from stsem.stages.propagation.hold import uncovered
+from stsem.stages.propagation.method import Needs, Predicted
+from stsem.stages.register import Registration
+
+LOST = "no flow"
+
+
+class Flow:
+    """Follows every keyframe that frames may yet be predicted from; what came into the image gets the border's label.
+
+    Args:
+        preset: of OpenCV's dense inverse search.
+    """
+
+    needs = Needs(follows=True)
+
+    def __init__(self, preset: int = PRESET) -> None:
+        self._preset = preset
+        self._last: Grey | None = None
+        self._chains: dict[int, Chain] = {}
+
+    def see(self, frame: Frame, registration: Registration) -> None:
+        """One link more in every chain; an image of another size breaks them."""
+        grey = working_grey(frame.image)
+        if self._last is None or self._last.shape != grey.shape:
+            self._chains = {}
+        if self._last is not None and self._chains:
+            flow = backward_flow(grey, self._last, preset=self._preset)
+            self._chains = {index: chain.extended(flow) for index, chain in self._chains.items()}
+        self._last = grey
+
+    def selected(self, frame: Frame, registration: Registration | None) -> None:
+        """A chain begins."""
+        if self._last is not None:
+            self._chains[frame.index] = Chain.start(self._last)
+
+    def finished(self, keyframe: Keyframe) -> None:
+        """See `Propagation.finished`."""
+
+    def forgotten(self, index: int) -> None:
+        """Its chain is let go."""
+        self._chains.pop(index, None)
+
+    def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
+        """The labels that the chain leads to."""
+        chain = self._chains.get(source.index)
+        if chain is None:
+            return Predicted(uncovered(source.segmentation, frame.size), source.index, LOST)
+        carried = chain.carry(source.segmentation.labels, source.segmentation.confidence, frame.size)
+        return Predicted(Segmentation(carried.labels, carried.confidence, covered=carried.covered), source.index)
+
+    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
+        """The share of the chain that never left the image."""
+        chain = self._chains.get(source.index)
+        return 0.0 if chain is None else float(np.count_nonzero(chain.inside)) / max(1, chain.inside.size)
