@@ -14,6 +14,8 @@ from stsem.slam.planes import FARTHEST_M, NEAREST_M
 
 WORKING_SIDE = 320
 """Longer side of the image in which points are sought: a quarter of the time at 640, and depth refines the pose."""
+SMALLEST = 33
+"""Pixels of an image within whose margins a point can lie."""
 FEW, MANY = 300, 600
 """Points of a frame that is followed, and of one that is kept or has to be recognised."""
 MAX_DISTANCE = 64
@@ -40,6 +42,9 @@ class Landmarks:
 
     def __len__(self) -> int:
         return len(self.xy)
+
+
+NOTHING = Landmarks(np.empty((0, 2), np.float32), np.empty((0, 32), np.uint8), np.empty((0, 3), np.float32))
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +75,11 @@ def find_landmarks(image: Image, depth: Depth | None, camera: Camera, *, most: i
     scale = min(1.0, WORKING_SIDE / max(width, height))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     grey = cv2.resize(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), size, interpolation=cv2.INTER_AREA)
+    if min(size) < SMALLEST:
+        return NOTHING
     keypoints, descriptors = _detector(most).detectAndCompute(grey, None)
     if descriptors is None or not keypoints:
-        return Landmarks(np.empty((0, 2), np.float32), np.empty((0, 32), np.uint8), np.empty((0, 3), np.float32))
+        return NOTHING
     grain = np.array([width / size[0], height / size[1]], np.float32)
     xy = (np.array([keypoint.pt for keypoint in keypoints], np.float32) + 0.5) * grain - 0.5
     return Landmarks(xy, descriptors.astype(np.uint8, copy=False), _placed(xy, depth, camera))

@@ -105,6 +105,9 @@ class Tracker:
 
     def track(self, frame: Frame) -> Tracked:
         """The pose of `frame`, measured against the current keyframe, or found again among all of them."""
+        if frame.size != (self._camera.width, self._camera.height):
+            width, height = frame.size
+            return self._lose(f"image of {width}x{height}, but a camera of {self._camera.width}x{self._camera.height}")
         view = self._view(frame)
         if not self.keyframes:
             return self._begin(view)
