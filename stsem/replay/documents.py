@@ -18,8 +18,8 @@ from stsem.replay.engine import Replayed
 from stsem.replay.runs import Context, Found, part, scored, without_scores
 from stsem.stages.propagate import PROPAGATIONS
 
-_UNNAMED = "homography"
-"""What profiles were measured with that do not name the method."""
+_UNNAMED = "homography", "points"
+"""Method and work of `register` that profiles were measured with which do not name them."""
 _PACKAGES = ("mcap", "numpy", "onnxruntime", "opencv-python-headless")
 
 
@@ -185,9 +185,8 @@ def _other_method(context: Context) -> list[str]:
     profile, config = None if context.costing is None else context.costing.profile, context.config
     if profile is None or all(mode.segments_every_frame for mode in config.modes):
         return []
-    needs = PROPAGATIONS[config.propagation].needs
-    ran = config.propagation, registers(policy_of(config).needs_homography, needs)
-    measured = profile.made_for.get("propagation", _UNNAMED), profile.made_for.get("register", ran[1])
+    ran = config.propagation, registers(policy_of(config).needs_homography, PROPAGATIONS[config.propagation].needs)
+    measured = profile.made_for.get("propagation", _UNNAMED[0]), profile.made_for.get("register", _UNNAMED[1])
     if measured == ran:
         return []
     return [
