@@ -52,6 +52,7 @@ CATALOGUE: tuple[tuple[str, Facts], ...] = (
     ("trajectory.relocalised", Facts("frames", None)),
     ("trajectory.keyframes", Facts("frames", None)),
     ("trajectory.loops", Facts("frames", None)),
+    ("trajectory.n_*", Facts("frames", None)),
     ("trajectory.*_m", Facts("m", False)),
     ("trajectory.*_deg", Facts("deg", False)),
     ("map.points", Facts("points", None)),

@@ -11,8 +11,8 @@ from made_up_run import example
 
 from stsem.document.accuracy import Score
 from stsem.document.schema import MapScore, Run
-from stsem.document.trajectory import TrajectoryScore
 from stsem.document.timing import Latency, Outcomes, Throughput
+from stsem.document.trajectory import TrajectoryScore
 from stsem.report.contents import outline
 from stsem.report.frames_csv import frames_csv
 from stsem.report.html import html
