@@ -24,7 +24,7 @@ from stsem.geometry.carried import Carried
 from stsem.geometry.features import Features, extract
 from stsem.geometry.homography import estimate
 from stsem.geometry.reproject import View, correspond
-from stsem.geometry.warp import warp_onto
+from stsem.geometry.warp import warp_extended
 from stsem.log.log import Log, open_log
 from stsem.metrics.confusion import confusion
 from stsem.metrics.scores import scores
@@ -89,7 +89,7 @@ def homography(walk: Walk, frame: Frame) -> Carried:
     if found is None:
         return Carried(truth, None, covered.view(np.bool_))
     seen = cv2.warpPerspective(covered, found.H, frame.size, flags=cv2.INTER_NEAREST)
-    return Carried(warp_onto(truth, truth, found.H), None, np.asarray(seen, np.uint8).view(np.bool_))
+    return Carried(warp_extended(truth, found.H, frame.size), None, np.asarray(seen, np.uint8).view(np.bool_))
 
 
 def flowed(walk: Walk, frame: Frame) -> Carried:

@@ -37,13 +37,10 @@ def warp_covered(shape: tuple[int, ...], H: Matrix3, size: tuple[int, int]) -> B
     return np.asarray(warped, np.uint8).view(np.bool_)
 
 
-def warp_onto(background: npt.NDArray[Value], labels: npt.NDArray[Value], H: Matrix3) -> npt.NDArray[Value]:
-    """`warp_labels` with the labels of `background` (H, W), which is left as it is, where the keyframe does not reach.
+def warp_extended(values: npt.NDArray[Value], H: Matrix3, size: tuple[int, int]) -> npt.NDArray[Value]:
+    """Labels or confidence as `warp_labels` moves them; where the keyframe does not reach, those of its nearest border.
 
-    A pixel for which the keyframe has NO_LABEL gets NO_LABEL: it was reached. Confidence is moved likewise.
+    A pixel for which the keyframe has NO_LABEL gets NO_LABEL.
     """
-    height, width = background.shape
-    warped = cv2.warpPerspective(
-        labels, H, (width, height), dst=background.copy(), flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_TRANSPARENT
-    )
-    return np.asarray(warped, background.dtype)
+    warped = cv2.warpPerspective(values, H, size, flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(warped, values.dtype)

@@ -111,7 +111,7 @@ class AnswerRule:
         chosen, method = self._unfinished.pop(frame.index, None), self._method
         anchor = None if chosen is None else chosen.anchor
         features = None if anchor is None else anchor.features
-        keyframe = Keyframe(frame.index, frame.stamp_ns, answer, features, view_of(frame))
+        keyframe = Keyframe(frame.index, frame.stamp_ns, answer, features, view_of(frame), frame.image)
         if method is not None:
             method.finished(keyframe)
         older, self._source = self._source, keyframe

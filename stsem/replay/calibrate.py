@@ -135,7 +135,7 @@ def _between_keyframes(subject: Subject, frames: list[Frame], answer: Segmentati
     method.selected(frames[0], first)
     for i in range(_MEMORY, -1, -1):
         frame = frames[i % len(frames)]
-        keyframe = Keyframe(frame.index, frames[0].stamp_ns - i, answer, first.features, view_of(frame))
+        keyframe = Keyframe(frame.index, frames[0].stamp_ns - i, answer, first.features, view_of(frame), frame.image)
         method.finished(keyframe)
     anchors = () if first.features is None else (Anchor(frames[0].index, first.features),)
     last = register(frames[1], anchors)

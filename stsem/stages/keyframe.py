@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from stsem.frame import Frame, Segmentation
+from stsem.frame import Frame, Image, Segmentation
 from stsem.geometry.features import Features
 from stsem.geometry.reproject import View
 
@@ -17,6 +17,7 @@ class Keyframe:
         segmentation: its labels, at the size of its image.
         features: of its image; None if nobody looks at any.
         view: where its pixels are in space; None without depth, pose or camera.
+        image: (H, W, 3) uint8 RGB; None if nobody looks at it.
     """
 
     index: int
@@ -24,6 +25,7 @@ class Keyframe:
     segmentation: Segmentation
     features: Features | None = None
     view: View | None = None
+    image: Image | None = None
 
 
 def view_of(frame: Frame) -> View | None:

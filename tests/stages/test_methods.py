@@ -64,7 +64,7 @@ class Played:
     def finish(self, frame: Frame, labels: Labels) -> Keyframe:
         anchor = self.anchors.get(frame.index)
         features = None if anchor is None else anchor.features
-        keyframe = Keyframe(frame.index, frame.stamp_ns, Segmentation(labels), features, view_of(frame))
+        keyframe = Keyframe(frame.index, frame.stamp_ns, Segmentation(labels), features, view_of(frame), frame.image)
         self.method.finished(keyframe)
         return keyframe
 
@@ -210,16 +210,38 @@ def test_depth_falls_back_to_flow_and_says_so(lacks: str) -> None:
     other.select(blind)
     source = other.finish(blind, WALK[0][1])
     other.see(WALK[1][0])
-    assert not other.method._sources  # type: ignore[attr-defined]
+    assert not other.method._memory  # type: ignore[attr-defined]
     assert not other.predict(source, WALK[1][0]).remark
+
+
+def test_what_nobody_saw_is_guessed_and_not_covered() -> None:
+    """A wall of one class goes on as that class where the image of the keyframe ended, with the votes as confidence."""
+    wall_on_floor = np.where(np.arange(HEIGHT)[:, None] < 90, 0, 2).astype(np.uint8).repeat(WIDTH, axis=1)
+    played = Played(made("depth"))
+    first, last = WALK[0][0], WALK[-1][0]
+    played.see(first)
+    played.select(first)
+    sure = Segmentation(wall_on_floor, np.full(wall_on_floor.shape, 0.5, np.float32))
+    source = Keyframe(0, 0, sure, None, view_of(first), first.image)
+    played.method.finished(source)
+    for frame, _ in WALK[1:]:
+        played.see(frame)
+    answer = played.predict(source, last).answer
+    assert answer.covered is not None
+    assert answer.confidence is not None
+    new = slice(WIDTH - SHIFT * last.index + 8, WIDTH)
+    assert not answer.covered[:, new].any()
+    assert (answer.labels == wall_on_floor)[:, new].mean() > 0.9
+    assert (answer.confidence[answer.covered] == 0.5).all()
+    assert (answer.confidence[:, new] > 0.5).mean() > 0.9
 
 
 def test_depth_remembers_so_many_keyframes() -> None:
     """The newest by stamp, in whatever order they finished."""
     method, (frame, labels) = DepthWarp(CLASSES), WALK[0]
     for stamp in (*range(0, 2 * KEPT, 2), *range(1, 2 * KEPT, 2)):
-        method.finished(Keyframe(stamp, stamp, Segmentation(labels), None, view_of(frame)))
-    assert [stamp for stamp, _ in method._sources] == list(range(2 * KEPT - 1, KEPT - 1, -1))
+        method.finished(Keyframe(stamp, stamp, Segmentation(labels), None, view_of(frame), frame.image))
+    assert [memory.stamp_ns for memory in method._memory] == list(range(2 * KEPT - 1, KEPT - 1, -1))
 
 
 def test_flow_over_a_change_of_size_holds() -> None:

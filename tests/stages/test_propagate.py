@@ -69,14 +69,14 @@ def test_hold_resizes_by_nearest_neighbour() -> None:
 @settings(max_examples=60, deadline=None)
 @given(dx=st.integers(-25, 25), dy=st.integers(-18, 18), seed=st.integers(0, 5))
 def test_translations_are_exact(dx: int, dy: int, seed: int) -> None:
-    """Whole pixels move to the pixel; what the keyframe does not reach is copied in place; 255 stays 255."""
+    """Whole pixels move to the pixel; what the keyframe does not reach gets its border; 255 stays 255."""
     labels = picture(seed)
     answer = warped_by(shift(dx, dy), keyframe(labels), frame())
     expected, reached = labels.copy(), np.zeros(labels.shape, np.bool_)
     for y in range(HEIGHT):
         for x in range(WIDTH):
-            if 0 <= y - dy < HEIGHT and 0 <= x - dx < WIDTH:
-                expected[y, x], reached[y, x] = labels[y - dy, x - dx], True
+            expected[y, x] = labels[min(max(y - dy, 0), HEIGHT - 1), min(max(x - dx, 0), WIDTH - 1)]
+            reached[y, x] = 0 <= y - dy < HEIGHT and 0 <= x - dx < WIDTH
     assert (answer.labels == expected).all()
     assert answer.covered is not None
     assert (answer.covered == reached).all()

@@ -1,4 +1,6 @@
-"""Depth: the exact warp by depth and pose from the newest keyframes that saw each point; the rest by flow."""
+"""Depth: the exact warp by depth and pose from the keyframes that saw each point; the rest by likeness and flow."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -6,6 +8,7 @@ from stsem.classes import ClassSet
 from stsem.frame import Frame, Segmentation
 from stsem.geometry.carried import Carried
 from stsem.geometry.carry import Source, carry, moving_classes
+from stsem.geometry.likeness import Examples, completed, described, remembered
 from stsem.geometry.reproject import Rows, View, among
 from stsem.stages.keyframe import Keyframe, view_of
 from stsem.stages.propagation.flow import Flow
@@ -13,16 +16,27 @@ from stsem.stages.propagation.method import Needs, Predicted
 from stsem.stages.register import Registration
 
 KEPT = 32
-"""Keyframes remembered: up to 9 bytes a pixel each, 149 MB in all at 960x540."""
+"""Keyframes remembered: up to 9 bytes a pixel each, 152 MB in all at 960x540 with what they look like."""
 SAMPLES = 2048
 """Pixels by which the coverage of a frame is foretold."""
 NO_SPACE = "no depth or pose: by flow"
 
 
-class DepthWarp:
-    """Asks up to `KEPT` finished keyframes, the newest first; persons, and what none of them saw, come by flow.
+@dataclass(frozen=True, eq=False)
+class _Memory:
+    """What is kept of a finished keyframe: its place in time, its pixels in space, and what they look like."""
 
-    A frame without depth, pose or camera is predicted by flow alone; a keyframe without them is not asked.
+    stamp_ns: int
+    source: Source
+    examples: Examples
+
+
+class DepthWarp:
+    """Asks up to `KEPT` finished keyframes, the newest first; persons come by flow.
+
+    What neither covers gets the label of the most similar points of those keyframes, and where its own depth is
+    unknown, what flow says. A frame without depth, pose or camera is predicted by flow alone; a keyframe without them
+    is not asked.
 
     Args:
         classes: of the labels: which of them move by themselves is told by name.
@@ -33,7 +47,8 @@ class DepthWarp:
     def __init__(self, classes: ClassSet) -> None:
         self._moving = moving_classes(classes)
         self._flow = Flow()
-        self._sources: tuple[tuple[int, Source], ...] = ()
+        self._memory: tuple[_Memory, ...] = ()
+        self._likeness = remembered(())
 
     def see(self, frame: Frame, registration: Registration) -> None:
         """See `Flow.see`."""
@@ -45,26 +60,28 @@ class DepthWarp:
 
     def finished(self, keyframe: Keyframe) -> None:
         """Remembered with its depth; the oldest one makes room."""
-        if keyframe.view is None:
+        view, image, answer = keyframe.view, keyframe.image, keyframe.segmentation
+        if view is None or image is None:
             return
-        answer = keyframe.segmentation
-        source = Source(keyframe.view, answer.labels, answer.confidence).without(self._moving)
-        newest_first = sorted([(keyframe.stamp_ns, source), *self._sources], key=lambda pair: -pair[0])
-        self._sources = tuple(newest_first[:KEPT])
+        source = Source(view, answer.labels, answer.confidence).without(self._moving)
+        new = _Memory(keyframe.stamp_ns, source, Examples.of(described(view, image), answer.labels))
+        self._memory = tuple(sorted([new, *self._memory], key=lambda memory: -memory.stamp_ns)[:KEPT])
+        self._likeness = remembered([memory.examples for memory in self._memory])
 
     def forgotten(self, index: int) -> None:
         """Its chain is let go; its depth and labels stay."""
         self._flow.forgotten(index)
 
     def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
-        """By depth where a keyframe saw the point, else by flow from the newest."""
+        """By depth where a keyframe saw the point; persons by flow; the rest by likeness."""
         by_flow, view = self._flow.predict(source, frame, registration), view_of(frame)
         if view is None:
             return Predicted(by_flow.answer, source.index, NO_SPACE)
         answer = by_flow.answer
         covered = np.zeros(answer.labels.shape, np.bool_) if answer.covered is None else answer.covered
         rest = Carried(answer.labels, answer.confidence, covered)
-        found = carry(view, [source for _, source in self._sources], rest, moving=self._moving)
+        seen = carry(view, [memory.source for memory in self._memory], rest, moving=self._moving)
+        found = completed(seen, described(view, frame.image), self._likeness)
         return Predicted(Segmentation(found.labels, found.confidence, covered=found.covered), source.index)
 
     def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
@@ -79,8 +96,8 @@ class DepthWarp:
     def _seen(self, view: View, rows: Rows) -> int:
         """How many of the pixels `rows` a keyframe saw."""
         left = rows
-        for _, source in self._sources:
-            pairs = among(view, source.view, left, beside=False)
+        for memory in self._memory:
+            pairs = among(view, memory.source.view, left, beside=False)
             left = left[~pairs.found.reshape(-1)[: len(left)]]
         return len(rows) - len(left)
 

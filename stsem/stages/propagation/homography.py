@@ -5,9 +5,9 @@ import numpy as np
 
 from stsem.frame import Frame, Segmentation
 from stsem.geometry.homography import Matrix3, is_sane
-from stsem.geometry.warp import warp_covered, warp_onto
+from stsem.geometry.warp import warp_covered, warp_extended
 from stsem.stages.keyframe import Keyframe
-from stsem.stages.propagation.hold import held, uncovered
+from stsem.stages.propagation.hold import uncovered
 from stsem.stages.propagation.method import Memoryless, Needs, Predicted
 from stsem.stages.register import Anchor, Registration, between
 
@@ -15,10 +15,10 @@ LOST = "no homography"
 
 
 class HomographyWarp(Memoryless):
-    """Warps the keyframe's labels by the homography from it; what it does not cover is copied in place.
+    """Warps the keyframe's labels by the homography from it; what it does not cover gets the label of its border.
 
-    A copied border is right more often than one without a label (docs/propagation.md). Without a trustworthy
-    homography the whole keyframe is copied.
+    That is right more often than the same pixel of the keyframe, or no label (docs/propagation.md). Without a
+    trustworthy homography the whole keyframe is copied.
 
     Args:
         seed: of the robust estimation.
@@ -30,7 +30,7 @@ class HomographyWarp(Memoryless):
         self._seed = seed
 
     def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
-        """Warped labels, holes filled from the same pixel of the keyframe."""
+        """Warped labels, extended at the border of the keyframe."""
         return _warped(source, frame, self._from(source, frame, registration))
 
     def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
@@ -84,7 +84,7 @@ class ChainedHomography:
         self._chains.pop(index, None)
 
     def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
-        """Warped labels, holes filled from the same pixel of the keyframe."""
+        """Warped labels, extended at the border of the keyframe."""
         return _warped(source, frame, self._chains.get(source.index))
 
     def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
@@ -116,11 +116,8 @@ def _warped(source: Keyframe, frame: Frame, H: Matrix3 | None) -> Predicted:
     segmentation = source.segmentation
     if H is None:
         return Predicted(uncovered(segmentation, frame.size), source.index, LOST)
-    behind = held(segmentation, frame.size)
-    labels = warp_onto(behind.labels, segmentation.labels, H)
-    confidence = None
-    if behind.confidence is not None and segmentation.confidence is not None:
-        confidence = warp_onto(behind.confidence, segmentation.confidence, H)
+    labels, sure = warp_extended(segmentation.labels, H, frame.size), segmentation.confidence
+    confidence = None if sure is None else warp_extended(sure, H, frame.size)
     covered = warp_covered(segmentation.labels.shape, H, frame.size)
     return Predicted(Segmentation(labels, confidence, covered=covered), source.index)
 
