@@ -68,7 +68,7 @@ class FrameResult:
         outcome: exactly one.
         keyframe: log index of the keyframe that its labels come from (its own index when segmented); None without.
         reason: why it became a keyframe (`first`, `rotation`, `translation`, `time`, `interval`, `no homography`,
-            `every frame`, ...), why it has no answer, or what its prediction had to do without; "" otherwise.
+            `every frame`, ...), or why it has no answer; "" otherwise.
         coverage: share of pixels of `labels` that are not NO_LABEL; None without an answer.
         spans: its jobs, in order of start.
         labels: (H, W) uint8 in the log's classes; None without an answer.
@@ -76,6 +76,7 @@ class FrameResult:
         uncertainty: maps (H, W) from the network; None where it gives none, and for answers that were predicted.
         covered: (H, W) bool, the pixels of a predicted answer that rest on evidence; None where nobody says.
         covered_share: the share of them, 0..1.
+        remark: what its prediction had to do without; "" otherwise.
     """
 
     index: int
@@ -93,6 +94,7 @@ class FrameResult:
     uncertainty: Uncertainty | None = None
     covered: Bools | None = None
     covered_share: float | None = None
+    remark: str = ""
 
 
 class Spans(Packed[Span]):
@@ -117,12 +119,13 @@ _OUTCOMES = tuple(Outcome)
 
 
 class Results(Packed[FrameResult]):
-    """What became of frames, without spans and images, in 61 bytes each."""
+    """What became of frames, without spans and images, in 65 bytes each."""
 
-    layout = Struct("<iqqqqbiidd")
+    layout = Struct("<iqqqqbiiddi")
 
     def __init__(self, items: Iterable[FrameResult] = ()) -> None:
         self._reasons: Codes[str] = Codes()
+        self._remarks: Codes[str] = Codes()
         super().__init__(items)
 
     def _pack(self, item: FrameResult) -> tuple[float, ...]:
@@ -131,15 +134,16 @@ class Results(Packed[FrameResult]):
             packed_time(item.answered_ns), _OUTCOMES.index(item.outcome),
             -1 if item.keyframe is None else item.keyframe, self._reasons.code(item.reason),
             -1.0 if item.coverage is None else item.coverage,
-            -1.0 if item.covered_share is None else item.covered_share,
+            -1.0 if item.covered_share is None else item.covered_share, self._remarks.code(item.remark),
         )  # fmt: skip
 
     def _unpack(
         self, index: int, stamp_ns: int, arrival_ns: int, taken_ns: int, answered_ns: int, outcome: int,
-        keyframe: int, reason: int, coverage: float, covered_share: float,
+        keyframe: int, reason: int, coverage: float, covered_share: float, remark: int,
     ) -> FrameResult:  # fmt: skip
         return FrameResult(
             index, stamp_ns, unpacked_time(arrival_ns), unpacked_time(taken_ns), unpacked_time(answered_ns),
             _OUTCOMES[outcome], None if keyframe < 0 else keyframe, self._reasons.value(reason),
             None if coverage < 0 else coverage, covered_share=None if covered_share < 0 else covered_share,
+            remark=self._remarks.value(remark),
         )  # fmt: skip

@@ -65,7 +65,7 @@ class Loss(Part):
 
 
 class DistanceRow(Part):
-    """Accuracy of the frames at one distance from their keyframe; offline pass."""
+    """Accuracy of the frames at one distance from their keyframe."""
 
     frames: Count
     """Distance to the keyframe as a difference of log indices; 0 is the keyframe itself."""

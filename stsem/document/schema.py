@@ -8,6 +8,7 @@ from typing import Literal, Self
 from pydantic import Field, JsonValue, model_validator
 
 from stsem.document.accuracy import Consistency, Coverage, DistanceRow, DistanceSummary, Loss, Score
+from stsem.document.background import Background
 from stsem.document.calibration import Calibration, ErrorDetection
 from stsem.document.origin import Host, Identity, Input
 from stsem.document.part import Count, Number, Part, Share
@@ -58,6 +59,9 @@ class Run(Part):
     """Log indices of the frames that went through the network."""
     keyframe_reasons: dict[str, Count] = Field(default_factory=dict)
     """Why frames became keyframes -> how many."""
+    background: Background | None = None
+    """What became of the frames that the network was to label beside the answers, and how old the answers were; null in
+    modes whose answers wait for the network, and without a clock."""
     covered: Share = None
     """Mean over the predicted answers of the share of pixels that rest on evidence: a keyframe saw the point, so far as
     the method can tell. null where the method does not say. Fraction."""
@@ -108,6 +112,11 @@ class Run(Part):
         if self.outcomes.total != self.frames:
             raise ValueError(
                 f"the outcomes of {self.mode} sum to {self.outcomes.total}, but there are {self.frames} frames"
+            )
+        if self.background is not None and self.background.finished != len(self.keyframes):
+            raise ValueError(
+                f"{self.background.finished} frames of {self.mode} were finished in the background, but there are "
+                f"{len(self.keyframes)} keyframes"
             )
         return self
 

@@ -4,10 +4,9 @@ The real-time run calls these steps as jobs on the simulated cores, the offline 
 by the same rule.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from stsem.frame import Frame, Segmentation
-from stsem.result import FrameResult
 from stsem.stages.keyframe import Keyframe, view_of
 from stsem.stages.propagation.method import Predicted, Propagation
 from stsem.stages.register import Anchor, Registering, Registration
@@ -152,13 +151,3 @@ class AnswerRule:
         homography = None if registration is None else registration.homographies.get(last.index)
         motion = None if homography is None else Motion.of(homography, frame.size)
         return policy.reason(Candidate(frame.index, last.index, frame.stamp_ns - last.stamp_ns, motion))
-
-
-def with_answer(result: FrameResult, answer: Segmentation | None) -> FrameResult:
-    """`result` with the images of its answer, if there is one."""
-    if answer is None:
-        return result
-    return replace(
-        result, labels=answer.labels, confidence=answer.confidence, uncertainty=answer.uncertainty,
-        covered=answer.covered,
-    )  # fmt: skip

@@ -13,13 +13,14 @@ from stsem.replay.build import Model, build_rule
 from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTimes, TimedFuse
 from stsem.replay.modes import Mode
+from stsem.replay.network import Background
 from stsem.replay.offline import OfflineRun
 from stsem.replay.queues import Mailbox, parse_queue
 from stsem.replay.realtime import Machine, RealTimeRun
 from stsem.replay.record import Record, Watch, scorecard_for
 from stsem.replay.schedule import Slot
 from stsem.replay.tracking import KnownPoses
-from stsem.result import FrameResult, Span
+from stsem.result import FrameResult, Outcome, Span
 from stsem.sim.costs import CostSource
 from stsem.stages.fuse import AnchoredFuse, Fuse, Fuser
 from stsem.stages.propagate import PROPAGATIONS
@@ -43,6 +44,7 @@ class ModeRun:
         by_log: of an offline pass with the log's poses, where those of SLAM were used and predictions depend on them.
         rule: of the real-time pass, or of the offline one if there is no other.
         spans: jobs of the real-time run.
+        background: what was segmented beside its answers; None where answers wait for the network.
     """
 
     mode: Mode
@@ -54,6 +56,14 @@ class ModeRun:
     by_log: Record | None = None
     rule: AnswerRule | None = None
     spans: Sequence[Span] = ()
+    background: Background | None = None
+
+    @property
+    def keyframes(self) -> dict[int, str]:
+        """Log index of each frame of `record` that the network has labelled -> why it was chosen, by index."""
+        if self.background is not None:
+            return {index: self.background.chosen[index] for index in sorted(self.background.finished)}
+        return {r.index: r.reason for r in self.record.results if r.outcome is Outcome.SEGMENTED}
 
     @property
     def record(self) -> Record:
@@ -149,8 +159,11 @@ class Lane:
             cores=config.cores, network_cores=run.mode.cores(config.cores, tracks=run.tracker is not None),
             costs=costs, mailbox=Mailbox(capacity, newest_wins), fuse=self._fuse(), count_decode=config.count_decode,
             reload=setup.reload, tracker=run.tracker, pose_on_path=run.pose_on_path,
+            in_background=run.mode.in_background,
         )  # fmt: skip
-        return RealTimeRun(setup.slots, run.rule, machine, run.real_time)
+        clocked = RealTimeRun(setup.slots, run.rule, machine, run.real_time)
+        run.background = clocked.background
+        return clocked
 
     def _without_clock(self, watch: Watch | None) -> OfflineRun:
         setup, run = self._setup, self._run

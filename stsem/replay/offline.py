@@ -2,15 +2,14 @@
 
 from collections.abc import Sequence
 
-from stsem.frame import Frame, Segmentation
+from stsem.frame import Frame
 from stsem.log.log import Loaded
-from stsem.replay.answer import AnswerRule, with_answer
-from stsem.replay.realtime import Judge
+from stsem.replay.answer import AnswerRule
+from stsem.replay.ending import Ending, predicted, segmented, unusable
+from stsem.replay.judging import Judge
 from stsem.replay.schedule import Slot
 from stsem.replay.tracking import posed
-from stsem.result import FrameResult, Outcome
 from stsem.stages.fuse import Fuser
-from stsem.stages.propagation.method import Predicted
 from stsem.stages.track import Tracker
 
 
@@ -38,46 +37,26 @@ class OfflineRun:
         """The next frame of the log."""
         slot = self._slots[self._pushed]
         self._pushed += 1
-        frame = None if loaded.frame is None or slot.missing else self._located(loaded.frame)
+        ending = unusable(slot, loaded)
+        frame = None if loaded.frame is None or ending is not None else self._located(loaded.frame)
         if self._only_truth and not slot.has_truth:
             return
         if frame is not None:
-            self._answer(slot, loaded, frame)
-        elif loaded.frame is None:
-            reason = "" if loaded.error is None else loaded.error.reason
-            self._end(slot, loaded, Outcome.UNDECODABLE, reason=reason)
-        else:
-            self._end(slot, loaded, Outcome.INCOMPLETE, reason=f"no {' and no '.join(slot.missing)}")
+            ending = self._answered(frame)
+        if ending is not None:
+            self._judge.ended(ending.result(slot), loaded)
 
     def _located(self, frame: Frame) -> Frame:
         return frame if self._tracker is None else posed(frame, self._tracker.prepare(frame)())
 
-    def _answer(self, slot: Slot, loaded: Loaded, frame: Frame) -> None:
+    def _answered(self, frame: Frame) -> Ending:
         registration = self._rule.register(frame) if self._rule.registers else None
         reason = self._rule.choose(frame, registration)
         if reason is None:
-            self._predicted(slot, loaded, self._rule.propagate(frame, registration))
-            return
+            return predicted(self._rule.propagate(frame, registration))
         answer = self._rule.segment(frame)
-        if answer is None:
-            self._end(slot, loaded, Outcome.NO_SOURCE, reason="no truth for the oracle")
-            return
-        self._rule.finish(frame, answer)
-        if self._fuse is not None and self._fuse.can_fuse(frame):
-            self._fuse(frame, answer)
-        self._end(slot, loaded, Outcome.SEGMENTED, answer=answer, keyframe=slot.index, reason=reason)
-
-    def _predicted(self, slot: Slot, loaded: Loaded, found: Predicted | None) -> None:
-        if found is None:
-            self._end(slot, loaded, Outcome.NO_SOURCE)
-        else:
-            self._end(
-                slot, loaded, Outcome.PROPAGATED, answer=found.answer, keyframe=found.keyframe, reason=found.remark
-            )
-
-    def _end(
-        self, slot: Slot, loaded: Loaded, outcome: Outcome, *, answer: Segmentation | None = None,
-        keyframe: int | None = None, reason: str = "",
-    ) -> None:  # fmt: skip
-        result = FrameResult(slot.index, slot.stamp_ns, None, None, None, outcome, keyframe, reason)
-        self._judge.ended(with_answer(result, answer), loaded)
+        if answer is not None:
+            self._rule.finish(frame, answer)
+            if self._fuse is not None and self._fuse.can_fuse(frame):
+                self._fuse(frame, answer)
+        return segmented(frame.index, answer, reason)

@@ -11,7 +11,7 @@ from stsem.log.log import Loaded
 from stsem.metrics.calibration import CalibrationMeter
 from stsem.metrics.consistency import ConsistencyMeter
 from stsem.metrics.scorecard import Scorecard
-from stsem.replay.realtime import NewestAnswer
+from stsem.replay.judging import NewestAnswer
 from stsem.replay.schedule import Slot
 from stsem.replay.unsure import Unsurest
 from stsem.result import FrameResult, Outcome, Results

@@ -16,6 +16,7 @@ from stsem.metrics.outcomes import count_outcomes
 from stsem.metrics.scorecard import Accuracy
 from stsem.metrics.throughput import throughput
 from stsem.replay import accuracy, timing, trajectories
+from stsem.replay.beside import background
 from stsem.replay.build import Model
 from stsem.replay.calibration import calibration, error_detection
 from stsem.replay.config import RunConfig
@@ -23,7 +24,7 @@ from stsem.replay.costing import Costing
 from stsem.replay.engine import Replayed
 from stsem.replay.lanes import ModeRun
 from stsem.replay.record import Record
-from stsem.result import ANSWER_STAGES, FrameResult, Outcome, Span
+from stsem.result import ANSWER_STAGES, Span
 
 NO_CLOCK = "--clock offline"
 NO_OFFLINE = "--no-offline"
@@ -99,15 +100,14 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
         clock=config.clock,
         frames=len(context.replayed.slots),
         outcomes=timing.outcomes({str(outcome): n for outcome, n in counts.items()}),
-        keyframes=tuple(r.index for r in record.results if r.outcome is Outcome.SEGMENTED),
-        keyframe_reasons=dict(
-            sorted(Counter(r.reason for r in record.results if r.outcome is Outcome.SEGMENTED).items())
-        ),
+        keyframes=tuple(run.keyframes),
+        keyframe_reasons=dict(sorted(Counter(run.keyframes.values()).items())),
+        background=background(context.log, run, found.clocked),
         covered=_covered(record),
-        remarks=dict(sorted(Counter(r.reason for r in record.results if r.reason and _is_predicted(r)).items())),
+        remarks=dict(sorted(Counter(r.remark for r in record.results if r.remark).items())),
         keyframes_moved=0 if run.rule is None else run.rule.moved,
         stages_inside=inside,
-        stages_disabled=_disabled(context, run, record),
+        stages_disabled=_disabled(context, run),
         coverage=_coverage(context, found),
         offline=accuracy.score(offline, classes),
         delivered=accuracy.score(own, classes),
@@ -142,10 +142,6 @@ def _offline_by_poses(context: Context, found: Found) -> dict[str, Score | None]
     }  # fmt: skip
 
 
-def _is_predicted(result: FrameResult) -> bool:
-    return result.outcome is Outcome.PROPAGATED
-
-
 def _covered(record: Record) -> float | None:
     """Mean share of the pixels of predicted answers that rest on evidence; None where nobody says."""
     shares = [r.covered_share for r in record.results if r.covered_share is not None]
@@ -156,7 +152,7 @@ def _timing(context: Context, run: ModeRun) -> tuple[Latency | None, Throughput 
     if run.real_time is None:
         return None, None, ()
     config, results = context.config, run.real_time.results
-    path = (*ANSWER_STAGES, "track") if run.pose_on_path else ANSWER_STAGES
+    path = _path(run)
     late = latency(results, run.spans, distinct_samples=_distinct_samples(context, run), answer_stages=path)
     deadline = timing.deadline_ns(config.deadline_ms, context.log.period_ns, config.exact_rate)
     fast = throughput(
@@ -167,6 +163,12 @@ def _timing(context: Context, run: ModeRun) -> tuple[Latency | None, Throughput 
         timing.throughput(fast, deadline, context.sustainable_hz.get(run.mode.name)),
         timing.stages_inside(late.inside),
     )
+
+
+def _path(run: ModeRun) -> tuple[str, ...]:
+    """The stages that an answer may wait for."""
+    inside = ANSWER_STAGES if run.background is None else tuple(s for s in ANSWER_STAGES if s != "segment")
+    return (*inside, "track") if run.pose_on_path else inside
 
 
 def _distinct_samples(context: Context, run: ModeRun) -> int | None:
@@ -189,11 +191,11 @@ def _distinct_durations(spans: Iterable[Span]) -> int:
     return len(set(slowest))
 
 
-def _disabled(context: Context, run: ModeRun, record: Record) -> dict[str, int]:
+def _disabled(context: Context, run: ModeRun) -> dict[str, int]:
     """Keyframes that `fuse` could not use, because an optional channel is missing for them."""
     if run.cloud is None:
         return {}
-    lacking = sum(not _fusable(context, run, r.index) for r in record.results if r.outcome is Outcome.SEGMENTED)
+    lacking = sum(not _fusable(context, run, index) for index in run.keyframes)
     return {"fuse": lacking} if lacking else {}
 
 

@@ -15,10 +15,11 @@ from stsem.log.plan import NEEDS
 from stsem.replay.answer import AnswerRule, Prediction
 from stsem.replay.build import policy_of, registering
 from stsem.replay.config import RunConfig
+from stsem.replay.judging import NewestAnswer
 from stsem.replay.lanes import CostsOf, needs_pose
 from stsem.replay.modes import Mode
 from stsem.replay.queues import Mailbox, parse_queue
-from stsem.replay.realtime import Machine, NewestAnswer, RealTimeRun
+from stsem.replay.realtime import Machine, RealTimeRun
 from stsem.replay.schedule import Slot, horizon_ns, schedule
 from stsem.result import FrameResult
 from stsem.stages.keyframe import Keyframe
@@ -152,6 +153,7 @@ class Probe:
             count_decode=self._config.count_decode,
             tracker=self._tracker,
             pose_on_path=needs_pose(mode, self._config, self._tracker),
+            in_background=mode.in_background,
         )
         results = _Results()
         run = RealTimeRun(slots, AnswerRule(labels, prediction), machine, results)

@@ -88,15 +88,19 @@ class Bench:
     """Runs one mode over made-up frames and keeps everything."""
 
     def __init__(
-        self, slots: tuple[Slot, ...], *, keyframes: int | None, register: bool, queue: str, costs: dict
-    ) -> None:
+        self, slots: tuple[Slot, ...], *, keyframes: int | None, register: bool, queue: str, costs: dict,
+        in_background: bool = False,
+    ) -> None:  # fmt: skip
         prediction = None
         if keyframes is not None:
             prediction = Prediction(EveryPolicy(keyframes), CopyKeyframe(), NoFeatures() if register else None)
         classes = ClassSet(tuple(f"frame {i}" for i in range(max(len(slots), 2))))
         self.slots, self.record = slots, Record(slots, Scorecard(classes), frozenset())
         capacity, newest_wins = parse_queue(queue)
-        machine = Machine(2, 2, ConstantCosts(costs), Mailbox(capacity, newest_wins))
+        machine = Machine(
+            2, 1 if in_background else 2, ConstantCosts(costs), Mailbox(capacity, newest_wins),
+            in_background=in_background,
+        )  # fmt: skip
         self.run = RealTimeRun(slots, AnswerRule(NumberSegmenter(), prediction), machine, self.record)
 
     def play(self, broken: frozenset[int] = frozenset()) -> "Bench":

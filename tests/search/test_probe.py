@@ -34,11 +34,8 @@ def gappy_log(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Log]:
 
 def shown(results: list[FrameResult]) -> list[tuple[Any, ...]]:
     """What a replay without labels can know: not what a prediction had to do without."""
-    blank: dict[str, Any] = {"coverage": None, "covered_share": None, "labels": None, "covered": None}
-    return [
-        astuple(replace(r, **blank, reason="" if r.outcome is Outcome.PROPAGATED else r.reason))
-        for r in sorted(results, key=lambda r: r.index)
-    ]
+    blank: dict[str, Any] = {"coverage": None, "covered_share": None, "labels": None, "covered": None, "remark": ""}
+    return [astuple(replace(r, **blank)) for r in sorted(results, key=lambda r: r.index)]
 
 
 @pytest.mark.parametrize(
@@ -52,6 +49,8 @@ def shown(results: list[FrameResult]) -> list[tuple[Any, ...]]:
         {"queue": "lossless", "rate": "3", "map": False},
         {"count_decode": True, "cores": 1, "seed": 5},
         {"keyframe_translation": 0.03, "rate": "1/3"},
+        {"mode": "keyframe-async"},
+        {"mode": "keyframe-async", "keyframes": "every:2", "propagation": "flow", "rate": "2"},
     ],
     ids=str,
 )

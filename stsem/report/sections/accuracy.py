@@ -84,21 +84,43 @@ def _part(run: Run, name: str) -> tuple[str, str]:
 def distance_section(document: Document) -> Section | None:
     """Accuracy by distance to the keyframe."""
     runs = [run for run in document.runs if len(run.by_distance) > 1]
-    if not runs:
+    ages = _ages(document)
+    if not runs and not ages:
         return None
-    blocks: list[Block] = [Figure("distance", "mIoU over the distance to the keyframe")]
+    blocks: list[Block] = [Figure("distance", "mIoU over the distance to the keyframe")] if runs else []
     for run in runs:
         if run.by_distance_summary:
-            blocks.append(Text(_summary(run, run.by_distance_summary)))
+            blocks.append(Text(_summary(run, "distances", run.by_distance_summary)))
         if said := _evidence(run):
             blocks.append(Text(said))
-        blocks.append(Folded(f"By distance, {run.mode}", (_distances(run),)))
-    return Section("By distance to the keyframe", tuple(blocks))
+        note = "Offline pass. Distance 0 is the keyframe itself; ms: median of capture time."
+        blocks.append(Folded(f"By distance, {run.mode}", (_distances(run.by_distance, note),)))
+    return Section("By distance to the keyframe", (*blocks, *ages))
 
 
-def _summary(run: Run, summary: DistanceSummary) -> str:
+def _ages(document: Document) -> list[Block]:
+    """Accuracy by the age of the answer, of modes whose answers do not wait for the network."""
+    blocks: list[Block] = []
+    for run in document.runs:
+        beside = run.background
+        if beside is None or not beside.age_ms.n:
+            continue
+        oldest, mean = number(beside.age_ms.max, 0), number(beside.age_ms.mean, 0)
+        said = f"`{run.mode}`: answers rest on keyframes {mean} ms old on average, at most {oldest} ms."
+        if beside.by_age_summary:
+            said += " " + _summary(run, "ages", beside.by_age_summary)
+        blocks.append(Text(said))
+        if beside.by_age:
+            note = (
+                "Delivered. Age: from the keyframe that the labels come from to the frame; ms: median of capture time."
+            )
+            blocks.append(Folded(f"By age, {run.mode}", (_distances(beside.by_age, note),)))
+    return blocks
+
+
+def _summary(run: Run, what: str, summary: DistanceSummary) -> str:
     return (
-        f"`{run.mode}`, over the {summary.distances} distances with at least {summary.min_frames} frames: mIoU mean "
+        f"`{run.mode}`, over the {summary.distances} {what} with at least {summary.min_frames} frames: mIoU mean "
         f"{percent(summary.miou_mean)} %, minimum {percent(summary.miou_min)} %; pixel accuracy mean "
         f"{percent(summary.pixel_accuracy_mean)} %, minimum {percent(summary.pixel_accuracy_min)} %."
     )
@@ -111,18 +133,15 @@ def _evidence(run: Run) -> str:
     return f"`{run.mode}`: {'; '.join(said)}." if said else ""
 
 
-def _distances(run: Run) -> Table:
-    told = any(row.covered is not None for row in run.by_distance)
+def _distances(found: tuple[DistanceRow, ...], note: str) -> Table:
+    told = any(row.covered is not None for row in found)
     columns = (
         Column("frames"), Column("ms"), Column("mIoU, %"), Column("pixel accuracy, %"),
         *((Column("covered, %"), Column("there: mIoU, %"), Column("there: pixel accuracy, %")) if told else ()),
         Column("n"),
     )  # fmt: skip
-    rows = tuple(Row(_distance_cells(row, told)) for row in run.by_distance)
-    notes = ["Offline pass. Distance 0 is the keyframe itself; ms: median of capture time."]
-    if told:
-        notes.append(f"Covered: {meaning(DistanceRow, 'covered')}")
-    return Table(columns, rows, tuple(notes))
+    rows = tuple(Row(_distance_cells(row, told)) for row in found)
+    return Table(columns, rows, (note, f"Covered: {meaning(DistanceRow, 'covered')}") if told else (note,))
 
 
 def _distance_cells(row: DistanceRow, told: bool) -> tuple[str, ...]:
