@@ -40,7 +40,13 @@ def replay(
         str | None, option("--precision", panel=_PIPELINE, help="f32, int8 or (openvino only) bf16. [f32]")
     ] = None,
     keyframes: Annotated[
-        str | None, option("--keyframes", panel=_PIPELINE, metavar="POLICY", help="paper or every:N. [paper]")
+        str | None,
+        option(
+            "--keyframes",
+            panel=_PIPELINE,
+            metavar="POLICY",
+            help="paper, every:N, coverage:SHARE, budget:HZ. [paper]",
+        ),
     ] = None,
     propagation: Annotated[
         str | None,

@@ -7,11 +7,11 @@ by the same rule.
 from dataclasses import dataclass
 
 from stsem.frame import Frame, Segmentation
+from stsem.stages.candidate import Candidate, KeyframePolicy, Motion
 from stsem.stages.keyframe import Keyframe, view_of
 from stsem.stages.propagation.method import Predicted, Propagation
 from stsem.stages.register import Anchor, Registering, Registration
 from stsem.stages.segment import Segmenter
-from stsem.stages.select import Candidate, KeyframePolicy, Motion
 
 FIRST, EVERY_FRAME = "first", "every frame"
 
@@ -150,4 +150,6 @@ class AnswerRule:
         last = self._selected.frame
         homography = None if registration is None else registration.homographies.get(last.index)
         motion = None if homography is None else Motion.of(homography, frame.size)
-        return policy.reason(Candidate(frame.index, last.index, frame.stamp_ns - last.stamp_ns, motion))
+        coverage = None if registration is None else registration.coverage
+        elapsed_ns = frame.stamp_ns - last.stamp_ns
+        return policy.reason(Candidate(frame.index, frame.stamp_ns, last.index, elapsed_ns, motion, coverage))

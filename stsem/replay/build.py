@@ -21,11 +21,12 @@ from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTimes, TimedInferencer, TimedPropagation, TimedRegister
 from stsem.replay.memo import Memo
 from stsem.replay.modes import Mode
+from stsem.stages.candidate import KeyframePolicy
 from stsem.stages.propagate import PROPAGATIONS
 from stsem.stages.propagation.method import Propagation
 from stsem.stages.register import Register
 from stsem.stages.segment import NetworkSegmenter, OracleSegmenter, Segmenter
-from stsem.stages.select import KeyframePolicy, parse_policy
+from stsem.stages.select import parse_policy
 
 NETWORK_THREADS = 2
 """Threads of the network on two or more simulated cores; its output does not depend on them."""
@@ -105,16 +106,20 @@ def build_rule(mode: Mode, segmenter: Segmenter, classes: ClassSet, config: RunC
 def registering(policy: KeyframePolicy, method: Propagation, seed: int) -> Register | None:
     """What a policy and a method ask of `register`; None if nothing."""
     points, follows = policy.needs_homography or method.needs.points, method.needs.follows
-    return Register(seed, points, method if follows else None) if points or follows else None
+    foretells = policy.needs_coverage
+    if not (points or follows or foretells):
+        return None
+    return Register(seed, points, method if follows else None, method if foretells else None)
 
 
 def policy_of(config: RunConfig) -> KeyframePolicy:
-    """The keyframe policy with its numbers."""
+    """The keyframe policy with its numbers, for one run."""
     return parse_policy(
         config.keyframes,
         rotation=config.keyframe_rotation,
         translation=config.keyframe_translation,
         time_ns=round(config.keyframe_time_s * 1e9),
+        covers=PROPAGATIONS[config.propagation].covers,
     )
 
 

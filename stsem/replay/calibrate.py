@@ -12,6 +12,7 @@ from stsem.inference.threads import set_threads
 from stsem.mapping.cloud import LabelledCloud
 from stsem.sim.profile import CostProfile, key
 from stsem.slam.system import Slam
+from stsem.stages.candidate import KeyframePolicy
 from stsem.stages.fuse import Fuse
 from stsem.stages.keyframe import Keyframe, view_of
 from stsem.stages.propagation.method import Needs, Propagation
@@ -42,7 +43,7 @@ class Subject:
         network_cores: core counts to measure the network with.
         propagation: the method between keyframes.
         method: its object, which nobody else uses.
-        points: whether registering looks for features and homographies.
+        policy: of keyframes, which may ask `register` for more.
         seed: of registration.
         decode: decodes some frame of the log anew; None to leave decoding out.
         walk: frames to track, each near the one before, and the last near the first; None to leave tracking out.
@@ -54,7 +55,7 @@ class Subject:
     network_cores: tuple[int, ...]
     propagation: str
     method: Propagation
-    points: bool
+    policy: KeyframePolicy
     seed: int
     decode: Callable[[], object] | None = None
     walk: Iterable[Frame] | None = None
@@ -81,7 +82,7 @@ def measure(subject: Subject, frames: list[Frame], *, samples: int = SAMPLES, li
     made_for = {
         "network": subject.network.name, "model_sha256": subject.network.sha256, "image": f"{width}x{height}",
         "backend": f"{subject.backend} {subject.precision}", "propagation": subject.propagation,
-        "register": registers(subject.points, subject.method.needs),
+        "register": registers(subject.policy, subject.method.needs),
     }  # fmt: skip
     return CostProfile(hostclock.machine_name(), found, disturbed, made_for)
 
@@ -120,17 +121,23 @@ def _tracking(seed: int) -> Callable[[Frame], object]:
     return track
 
 
-def registers(points: bool, needs: Needs) -> str:
+def registers(policy: KeyframePolicy, needs: Needs) -> str:
     """What the stage `register` does, in words, as a profile's `made_for` has it."""
-    parts = [name for name, does in (("points", points or needs.points), ("the method's own", needs.follows)) if does]
-    return " and ".join(parts) or "points"
+    parts = {
+        "points": policy.needs_homography or needs.points,
+        "the method's own": needs.follows,
+        "coverage": policy.needs_coverage,
+    }
+    return " and ".join(name for name, does in parts.items() if does) or "points"
 
 
 def _between_keyframes(subject: Subject, frames: list[Frame], answer: Segmentation) -> Iterator[_Stage]:
     """`register` and `propagate` from the first frame as the newest keyframe, with the method's memory full."""
     method, needs = subject.method, subject.method.needs
     follower = method if needs.follows else None
-    register = Register(subject.seed, subject.points or needs.points or not needs.follows, follower)
+    foreteller = method if subject.policy.needs_coverage else None
+    points = subject.policy.needs_homography or needs.points
+    register = Register(subject.seed, points or not (follower or foreteller), follower, foreteller)
     first = register(frames[0], ())
     method.selected(frames[0], first)
     for i in range(_MEMORY, -1, -1):

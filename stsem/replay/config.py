@@ -57,11 +57,11 @@ class RunConfig(BaseModel):
     model: str = Field("default", description="Shipped network, a FILE.onnx with its sidecar .toml, or 'oracle'.")
     backend: str = Field("onnxruntime", description="What runs the network: onnxruntime or openvino.")
     precision: str = Field("f32", description="Arithmetic of the network: f32, int8 or (openvino only) bf16.")
-    keyframes: str = Field("paper", description="Keyframe policy: 'paper' or 'every:N'.")
+    keyframes: str = Field("paper", description="Keyframe policy: 'paper', 'every:N', 'coverage:SHARE' or 'budget:HZ'.")
     keyframe_rotation: float = Field(0.1, gt=0, description="paper: threshold on |H[:2,:2] - I|_F.")
     keyframe_translation: float = Field(0.15, gt=0, description="paper: threshold on |H[:2,2]|, in image widths.")
     keyframe_time_s: float = Field(
-        1.0, gt=0, le=LONGEST_S, description="paper: longest time between keyframes, seconds."
+        1.0, gt=0, le=LONGEST_S, description="paper, coverage: longest time between keyframes, seconds."
     )
     propagation: str = Field("homography", description="How frames between keyframes are predicted.")
     pose: PoseSource = Field(
@@ -144,7 +144,25 @@ class RunConfig(BaseModel):
             raise ValueError(f"the window ends at {self.end:g} s, not after its start at {self.start or 0.0:g} s")
         if self.sustainable and self.clock == "offline":
             raise ValueError("--sustainable needs the simulated clock, but --clock offline was asked for")
+        self._check_coverage()
         return self
+
+    def _check_coverage(self) -> None:
+        """Raise ValueError where a policy asks for coverage that nobody could tell."""
+        covers = PROPAGATIONS[self.propagation].covers
+        policy = parse_policy(self.keyframes, rotation=1.0, translation=1.0, time_ns=1, covers=covers)
+        if not policy.needs_coverage or all(mode.segments_every_frame for mode in self.modes):
+            return
+        if not covers:
+            raise ValueError(
+                f"--keyframes {self.keyframes} asks how much a prediction covers, which --propagation "
+                f"{self.propagation} cannot tell; choose another propagation, or --keyframes paper, every:N, budget:HZ"
+            )
+        if self.sustainable:
+            raise ValueError(
+                f"--sustainable decides keyframes without images, but --keyframes {self.keyframes} asks how much of an "
+                "image is covered; choose paper or every:N"
+            )
 
     @property
     def modes(self) -> tuple[Mode, ...]:

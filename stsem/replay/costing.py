@@ -105,9 +105,9 @@ def subject(
     network: Network = model.network or at_precision(load_network(DEFAULT), config.precision)
     decode = _decoder(log, depth="depth" in needed_roles(model, config, fused=fused)) if config.count_decode else None
     method = PROPAGATIONS[config.propagation].make(model.classes, config.seed)
-    points = policy_of(config).needs_homography
     return Subject(
-        network, config.backend, config.precision, cores, config.propagation, method, points, config.seed, decode,
+        network, config.backend, config.precision, cores, config.propagation, method, policy_of(config), config.seed,
+        decode,
         _ThereAndBack(log) if track else None,
     )  # fmt: skip
 
@@ -160,7 +160,7 @@ def _calibrated(log: Log, config: RunConfig, model: Model, fused: bool, say: Cal
     about = {
         "machine": hostclock.machine_name(), "network": wanted.network.sha256, "size": frames[0].size,
         "backend": [wanted.backend, wanted.precision], "cores": wanted.network_cores,
-        "propagation": config.propagation, "register": registers(wanted.points, wanted.method.needs),
+        "propagation": config.propagation, "register": registers(wanted.policy, wanted.method.needs),
         "fused": fused, "decode": config.count_decode,
         distribution: importlib.metadata.version(distribution),
         "opencv": importlib.metadata.version("opencv-python-headless"), "stsem": __version__,

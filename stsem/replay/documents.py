@@ -185,7 +185,7 @@ def _other_method(context: Context) -> list[str]:
     profile, config = None if context.costing is None else context.costing.profile, context.config
     if profile is None or all(mode.segments_every_frame for mode in config.modes):
         return []
-    ran = config.propagation, registers(policy_of(config).needs_homography, PROPAGATIONS[config.propagation].needs)
+    ran = config.propagation, registers(policy_of(config), PROPAGATIONS[config.propagation].needs)
     measured = profile.made_for.get("propagation", _UNNAMED[0]), profile.made_for.get("register", _UNNAMED[1])
     if measured == ran:
         return []

@@ -105,9 +105,9 @@ class TimedPropagation:
         """See `Propagation.predict`."""
         return self.times.measure("propagate", lambda: self.inner.predict(source, frame, registration))
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
         """See `Propagation.expected_coverage`."""
-        return self.inner.expected_coverage(source, frame, registration)
+        return self.inner.expected_coverage(frame, registration)
 
 
 @dataclass(frozen=True)

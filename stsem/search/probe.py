@@ -65,7 +65,7 @@ class _NoLabels(Memoryless):
     def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
         return Predicted(_NOTHING, source.index)
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
         return None
 
 
@@ -131,10 +131,9 @@ class Probe:
         self._log, self._config, self._costs_of, self._usable = log, config, costs_of, usable
         self._patience_ns = patience_ns
         self._needs, self._fused, self._tracker = needs, fused, tracker
-        self._policy = policy_of(config)
         self._method = PROPAGATIONS[config.propagation].needs
         predicts = any(not mode.segments_every_frame for mode in config.modes)
-        asked = registering(self._policy, _NoLabels(self._method, usable), config.seed)
+        asked = registering(policy_of(config), _NoLabels(self._method, usable), config.seed)
         self._frames, features = self._decoded(predicts and asked is not None and asked.points)
         self._register = None if asked is None else _RememberedRegister(config.seed, features)
 
@@ -142,7 +141,8 @@ class Probe:
         """Every frame's result when `mode` replays the log at `rate`."""
         slots = schedule(self._log.plans, rate, frozenset(), self._needs)
         labels = _NoLabels(self._method, self._usable)
-        prediction = None if mode.segments_every_frame else Prediction(self._policy, labels, self._register)
+        policy = policy_of(self._config)
+        prediction = None if mode.segments_every_frame else Prediction(policy, labels, self._register)
         capacity, newest_wins = parse_queue(self._config.queue)
         machine = Machine(
             cores=self._config.cores,

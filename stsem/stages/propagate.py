@@ -18,14 +18,16 @@ class Method:
     Args:
         needs: what it asks of others.
         make: a method for one run, from the classes of the labels and the run's seed.
+        covers: whether it can tell what it covers.
     """
 
     needs: Needs
     make: Callable[[ClassSet, int], Propagation]
+    covers: bool = True
 
 
 PROPAGATIONS: dict[str, Method] = {
-    "hold": Method(Hold.needs, lambda classes, seed: Hold()),
+    "hold": Method(Hold.needs, lambda classes, seed: Hold(), covers=False),
     "homography": Method(HomographyWarp.needs, lambda classes, seed: HomographyWarp(seed)),
     "homography-chained": Method(ChainedHomography.needs, lambda classes, seed: ChainedHomography(seed)),
     "flow": Method(Flow.needs, lambda classes, seed: Flow()),

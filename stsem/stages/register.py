@@ -5,7 +5,7 @@ that its labels would come from, where that is another.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from stsem import chance
@@ -27,10 +27,12 @@ class Registration:
     """Args:
     features: of this frame, kept in case it becomes a keyframe; None if nobody looks at any.
     homographies: log index of a keyframe -> its pixels to this frame's; None if none can be trusted.
+    coverage: share of the pixels that keyframes cover, foretold; None if nobody asks or knows.
     """
 
     features: Features | None = None
     homographies: Mapping[int, Homography | None] = field(default_factory=dict)
+    coverage: float | None = None
 
 
 class Registering(Protocol):
@@ -47,6 +49,13 @@ class Follower(Protocol):
         """The next frame taken."""
 
 
+class Foreteller(Protocol):
+    """Whoever knows how much of a frame keyframes cover."""
+
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
+        """The share, 0..1, of the frame taken last; None if it cannot tell."""
+
+
 @dataclass(frozen=True, eq=False)
 class Register:
     """Registers frames by ORB features and robust homographies, and shows them to who follows the image.
@@ -55,17 +64,21 @@ class Register:
         seed: of the robust estimation; each pair of frames draws for itself, so call order is irrelevant.
         points: whether anybody looks at features and homographies.
         follower: sees every frame; None if nobody does.
+        foreteller: tells the coverage of every frame; None if nobody asks.
     """
 
     seed: int
     points: bool = True
     follower: Follower | None = None
+    foreteller: Foreteller | None = None
 
     def __call__(self, frame: Frame, anchors: Sequence[Anchor]) -> Registration:
         """Features of `frame`, and the homography to it from each of the `anchors`."""
         registration = self._registered(frame, anchors) if self.points else Registration()
         if self.follower is not None:
             self.follower.see(frame, registration)
+        if self.foreteller is not None:
+            registration = replace(registration, coverage=self.foreteller.expected_coverage(frame, registration))
         return registration
 
     def _registered(self, frame: Frame, anchors: Sequence[Anchor]) -> Registration:

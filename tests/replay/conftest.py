@@ -49,7 +49,7 @@ class CopyKeyframe(Memoryless):
         """The keyframe's labels."""
         return Predicted(source.segmentation, source.index)
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> None:
+    def expected_coverage(self, frame: Frame, registration: Registration) -> None:
         """Unknown."""
 
 

@@ -17,6 +17,7 @@ from stsem.replay.calibrate import Subject, measure
 from stsem.stages.propagation.hold import Hold
 from stsem.stages.propagation.method import Predicted
 from stsem.stages.register import Registration
+from stsem.stages.select import PaperPolicy
 
 MS = 1_000_000
 COSTS_MS = {"segment": 100, "register": 5, "propagate": 2, "fuse": 7, "decode": 3}
@@ -111,12 +112,15 @@ def frames(count: int = 3) -> list[Frame]:
     ]  # fmt: skip
 
 
+PAPER = PaperPolicy(1.0, 1.0, 1)
+
+
 def subject(machine: Host, *, cores: tuple[int, ...] = (1, 2), decode: bool = False) -> Subject:
     def decoded() -> None:
         machine.work(COSTS_MS["decode"] * MS)
 
     return Subject(
-        FakeNetwork(), "onnxruntime", "f32", cores, "hold", SlowHold(machine), True, 0, decoded if decode else None  # type: ignore[arg-type]
+        FakeNetwork(), "onnxruntime", "f32", cores, "hold", SlowHold(machine), PAPER, 0, decoded if decode else None  # type: ignore[arg-type]
     )  # fmt: skip
 
 

@@ -51,7 +51,7 @@ class Followed(Memoryless):
         assert source.index in self.alive
         return Predicted(source.segmentation, source.index)
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> None:
+    def expected_coverage(self, frame: Frame, registration: Registration) -> None:
         """Unknown."""
 
 

@@ -68,7 +68,7 @@ class Copy(Memoryless):
         """As they are."""
         return Predicted(source.segmentation, source.index)
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
         """Nobody asks."""
         return None
 

@@ -110,7 +110,7 @@ def test_expected_coverage(name: str) -> None:
     source = played.finish(first, np.zeros_like(labels))
     for frame, _ in others:
         played.see(frame)
-        foretold = played.method.expected_coverage(source, frame, played.registration)
+        foretold = played.method.expected_coverage(frame, played.registration)
         covered = played.predict(source, frame).answer.covered
         assert covered is not None
         assert foretold == pytest.approx(covered.mean(), abs=0.03)

@@ -49,6 +49,7 @@ class DepthWarp:
         self._flow = Flow()
         self._memory: tuple[_Memory, ...] = ()
         self._likeness = remembered(())
+        self._selected: View | None = None
 
     def see(self, frame: Frame, registration: Registration) -> None:
         """See `Flow.see`."""
@@ -57,6 +58,7 @@ class DepthWarp:
     def selected(self, frame: Frame, registration: Registration | None) -> None:
         """See `Flow.selected`."""
         self._flow.selected(frame, registration)
+        self._selected = view_of(frame)
 
     def finished(self, keyframe: Keyframe) -> None:
         """Remembered with its depth; the oldest one makes room."""
@@ -84,20 +86,25 @@ class DepthWarp:
         found = completed(seen, described(view, frame.image), self._likeness)
         return Predicted(Segmentation(found.labels, found.confidence, covered=found.covered), source.index)
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
-        """The share of some pixels that any keyframe saw; by flow for a frame without depth. Persons are left out."""
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
+        """The share of some pixels with depth that any keyframe saw, persons or not; by flow for a frame without depth.
+
+        What has no depth is left out: a keyframe more would not change that.
+        """
         view = view_of(frame)
         if view is None:
-            return self._flow.expected_coverage(source, frame, registration)
+            return self._flow.expected_coverage(frame, registration)
         rows = _spread(view.depth.size)
         known = rows[view.depth.reshape(-1)[rows] > 0]
-        return self._seen(view, known) / max(1, len(rows))
+        return self._seen(view, known) / max(1, len(known))
 
     def _seen(self, view: View, rows: Rows) -> int:
         """How many of the pixels `rows` a keyframe saw."""
-        left = rows
-        for memory in self._memory:
-            pairs = among(view, memory.source.view, left, beside=False)
+        left, selected = rows, () if self._selected is None else (self._selected,)
+        for keyframe in (*selected, *(memory.source.view for memory in self._memory)):
+            if not len(left):
+                break
+            pairs = among(view, keyframe, left, beside=False)
             left = left[~pairs.found.reshape(-1)[: len(left)]]
         return len(rows) - len(left)
 

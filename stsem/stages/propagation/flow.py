@@ -25,6 +25,7 @@ class Flow:
         self._preset = preset
         self._last: Grey | None = None
         self._chains: dict[int, Chain] = {}
+        self._newest: int | None = None
 
     def see(self, frame: Frame, registration: Registration) -> None:
         """One link more in every chain; an image of another size breaks them."""
@@ -40,6 +41,7 @@ class Flow:
         """A chain begins."""
         if self._last is not None:
             self._chains[frame.index] = Chain.start(self._last)
+        self._newest = frame.index
 
     def finished(self, keyframe: Keyframe) -> None:
         """See `Propagation.finished`."""
@@ -56,7 +58,7 @@ class Flow:
         carried = chain.carry(source.segmentation.labels, source.segmentation.confidence, frame.size)
         return Predicted(Segmentation(carried.labels, carried.confidence, covered=carried.covered), source.index)
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
-        """The share of the chain that never left the image."""
-        chain = self._chains.get(source.index)
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
+        """The share of the chain from the newest keyframe that never left the image."""
+        chain = None if self._newest is None else self._chains.get(self._newest)
         return 0.0 if chain is None else float(np.count_nonzero(chain.inside)) / max(1, chain.inside.size)

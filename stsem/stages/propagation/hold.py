@@ -19,7 +19,7 @@ class Hold(Memoryless):
         """The keyframe's labels as they are, by nearest neighbour if the image size changed."""
         return Predicted(held(source.segmentation, frame.size), source.index)
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
         """None: it does not look."""
         return None
 

@@ -1,5 +1,7 @@
 """One homography for the whole image: from the keyframe at once (equation 2), or frame by frame."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -12,6 +14,14 @@ from stsem.stages.propagation.method import Memoryless, Needs, Predicted
 from stsem.stages.register import Anchor, Registration, between
 
 LOST = "no homography"
+
+
+@dataclass(frozen=True)
+class _Outline:
+    """A selected keyframe: its log index and the (width, height) of its image."""
+
+    index: int
+    size: tuple[int, int]
 
 
 class HomographyWarp(Memoryless):
@@ -28,14 +38,21 @@ class HomographyWarp(Memoryless):
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
+        self._newest: _Outline | None = None
+
+    def selected(self, frame: Frame, registration: Registration | None) -> None:
+        """Its outline is kept, to foretell coverage."""
+        self._newest = _Outline(frame.index, frame.size)
 
     def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
         """Warped labels, extended at the border of the keyframe."""
         return _warped(source, frame, self._from(source, frame, registration))
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
-        """The share of the image that the keyframe's outline, mapped, fills."""
-        return _filled(source, frame, self._from(source, frame, registration))
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
+        """The share of the image that the outline of the newest keyframe, mapped, fills."""
+        newest = self._newest
+        found = None if newest is None else registration.homographies.get(newest.index)
+        return _filled(newest, frame, None if found is None else found.H)
 
     def _from(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Matrix3 | None:
         if registration is None:
@@ -65,6 +82,7 @@ class ChainedHomography:
         self._seed = seed
         self._last: Anchor | None = None
         self._chains: dict[int, Matrix3 | None] = {}
+        self._newest: _Outline | None = None
 
     def see(self, frame: Frame, registration: Registration) -> None:
         """One link more in every chain."""
@@ -75,6 +93,7 @@ class ChainedHomography:
     def selected(self, frame: Frame, registration: Registration | None) -> None:
         """A chain begins."""
         self._chains[frame.index] = np.eye(3)
+        self._newest = _Outline(frame.index, frame.size)
 
     def finished(self, keyframe: Keyframe) -> None:
         """See `Propagation.finished`."""
@@ -87,9 +106,10 @@ class ChainedHomography:
         """Warped labels, extended at the border of the keyframe."""
         return _warped(source, frame, self._chains.get(source.index))
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
-        """The share of the image that the keyframe's outline, mapped, fills."""
-        return _filled(source, frame, self._chains.get(source.index))
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
+        """The share of the image that the outline of the newest keyframe, mapped, fills."""
+        newest = self._newest
+        return _filled(newest, frame, None if newest is None else self._chains.get(newest.index))
 
     def _link(self, frame: Frame, registration: Registration) -> Matrix3 | None:
         """From the frame before to this one."""
@@ -122,11 +142,11 @@ def _warped(source: Keyframe, frame: Frame, H: Matrix3 | None) -> Predicted:
     return Predicted(Segmentation(labels, confidence, covered=covered), source.index)
 
 
-def _filled(source: Keyframe, frame: Frame, H: Matrix3 | None) -> float:
+def _filled(keyframe: _Outline | None, frame: Frame, H: Matrix3 | None) -> float:
     """Share of the image that the outline of the keyframe fills, 0..1; 0 without a homography."""
-    if H is None:
+    if keyframe is None or H is None:
         return 0.0
-    (height, width), (w, h) = source.segmentation.labels.shape, frame.size
+    (width, height), (w, h) = keyframe.size, frame.size
     outline = np.array([[[0, 0], [width, 0], [width, height], [0, height]]], np.float64) - 0.5
     mapped = cv2.perspectiveTransform(outline, H)[0].astype(np.float32)
     image = np.array([[0, 0], [w, 0], [w, h], [0, h]], np.float32) - np.float32(0.5)

@@ -71,8 +71,15 @@ class Propagation(Protocol):
             registration: of `frame`; None if nobody registers.
         """
 
-    def expected_coverage(self, source: Keyframe, frame: Frame, registration: Registration | None) -> float | None:
-        """Share of the pixels that `predict` would cover, cheaply, 0..1; None if the method cannot tell."""
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
+        """Share of the pixels that keyframes cover, 0..1, once all that are selected are finished; None if unknown.
+
+        Cheap, before the frame is predicted or selected; a part of the stage `register` where a policy asks.
+
+        Args:
+            frame: the frame that was seen last; some frame was selected before.
+            registration: of `frame`.
+        """
 
 
 class Memoryless:
