@@ -26,7 +26,8 @@ def replay(
         list[str], typer.Argument(metavar="LOG...", help="MCAP files, folders of one recording, https:// or s3://.")
     ],
     mode: Annotated[
-        str | None, option("--mode", panel=_PIPELINE, metavar="MODE,...", help="per-frame, keyframe, both. [both]")
+        str | None,
+        option("--mode", panel=_PIPELINE, metavar="MODE,...", help="per-frame, keyframe, keyframe-async, both. [both]"),
     ] = None,
     model: Annotated[
         str | None,

@@ -204,6 +204,12 @@ def _warnings(context: Context) -> tuple[str, ...]:
         for run in context.replayed.runs
         if run.real_time is not None and not any(result.outcome.is_answer for result in run.real_time.results)
     ]
+    if context.config.cores == 1 and context.config.clock == "real-time":
+        found += [
+            f"{mode.name} needs two cores to answer while the network works; with one, answers wait for it."
+            for mode in context.config.modes
+            if mode.in_background
+        ]
     if lacking := context.replayed.without_depth:
         frames = len(context.replayed.slots)
         found.append(

@@ -11,6 +11,8 @@ from stsem.replay.tracking import TrackWorker, posed
 from stsem.stages.fuse import Fuser
 
 Then = Callable[[Segmentation | None], None]
+Free = Callable[[], None]
+Segment = Callable[[Frame, Then, Free], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,42 +33,54 @@ class NetworkJobs:
     fuse: Fuser | None
     track: TrackWorker | None
 
-    def segment(self, frame: Frame, then: Then) -> None:
-        """Segment `frame`; `then` is told when it is a keyframe, or with None when it cannot be segmented."""
+    def segment(self, frame: Frame, then: Then, free: Free = lambda: None) -> None:
+        """Segment `frame`.
+
+        Args:
+            frame: what was chosen.
+            then: told when it is a keyframe, or with None when it cannot be segmented.
+            free: told when no more work is to come, in the map neither.
+        """
 
         def finished(answer: Segmentation | None) -> None:
             if answer is not None:
                 self.rule.finish(frame, answer)
-                self._into_the_map(frame, answer)
             then(answer)
+            if answer is None or self.fuse is None:
+                free()
+            else:
+                self._into_the_map(self.fuse, frame, answer, free)
 
         self.jobs.submit(frame, "segment", self.cores, lambda: self.rule.segment(frame), finished)
 
-    def _into_the_map(self, frame: Frame, answer: Segmentation) -> None:
-        if self.track is None:
-            self._fuse(frame, answer)
-        else:
-            self.track.after(frame.index, lambda tracking: self._fuse(posed(frame, tracking), answer))
+    def _into_the_map(self, fuse: Fuser, frame: Frame, answer: Segmentation, free: Free) -> None:
+        def go_on(found: Frame) -> None:
+            if fuse.can_fuse(found):
+                self.jobs.submit(found, "fuse", 1, lambda: fuse(found, answer), lambda _: free())
+            else:
+                free()
 
-    def _fuse(self, frame: Frame, answer: Segmentation) -> None:
-        fuse = self.fuse
-        if fuse is not None and fuse.can_fuse(frame):
-            self.jobs.submit(frame, "fuse", 1, lambda: fuse(frame, answer), lambda _: None)
+        if self.track is None:
+            go_on(frame)
+        else:
+            self.track.after(frame.index, lambda tracking: go_on(posed(frame, tracking)))
 
 
 class Background:
     """Segments chosen frames beside the answer path, one at a time; at most two images are held.
 
-    A frame that is chosen while the network is busy waits in a mailbox of one; a newer one takes its place there, and
-    the older will never be a keyframe.
+    A frame that is chosen meanwhile waits in a mailbox of one; a newer one takes its place there, and the older will
+    never be a keyframe. The next one starts when the one before is in the map: so there is one job here at any time,
+    and a second core is left to the answers.
 
     Args:
-        segment: starts the network on a frame and tells when it has finished.
+        segment: starts the network on a frame, and tells when it is a keyframe, and when all work for it is done.
         abandon: told of a frame that lost its place.
     """
 
-    def __init__(self, segment: Callable[[Frame, Then], None], abandon: Callable[[Frame], None]) -> None:
+    def __init__(self, segment: Segment, abandon: Callable[[Frame], None]) -> None:
         self._segment, self._abandon = segment, abandon
+        self._busy = False
         self._running: Frame | None = None
         self._waiting: Frame | None = None
         self.chosen: dict[int, str] = {}
@@ -84,7 +98,7 @@ class Background:
     def hand(self, frame: Frame, reason: str) -> None:
         """The frame was chosen for `reason`, and goes to the network, or into its mailbox."""
         self.chosen[frame.index] = reason
-        if self._running is None:
+        if not self._busy:
             self._start(frame)
             return
         if self._waiting is not None:
@@ -93,13 +107,16 @@ class Background:
         self._waiting = frame
 
     def _start(self, frame: Frame) -> None:
-        self._running = frame
-        self._segment(frame, partial(self._finished, frame.index))
+        self._busy, self._running = True, frame
+        self._segment(frame, partial(self._finish, frame.index), self._follow)
 
-    def _finished(self, index: int, answer: Segmentation | None) -> None:
+    def _finish(self, index: int, answer: Segmentation | None) -> None:
         if answer is None:
             raise ValueError(f"frame {index} was chosen as a keyframe, but cannot be segmented")
         self.finished.append(index)
-        self._running, following, self._waiting = None, self._waiting, None
+        self._running = None
+
+    def _follow(self) -> None:
+        following, self._busy, self._waiting = self._waiting, False, None
         if following is not None:
             self._start(following)

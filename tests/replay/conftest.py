@@ -17,6 +17,7 @@ from stsem.replay.realtime import Machine, RealTimeRun
 from stsem.replay.record import Record
 from stsem.replay.schedule import Slot, horizon_ns, schedule
 from stsem.sim.costs import ConstantCosts
+from stsem.stages.fuse import Fuser
 from stsem.stages.keyframe import Keyframe
 from stsem.stages.propagation.method import Memoryless, Needs, Predicted
 from stsem.stages.register import Anchor, Registration
@@ -89,7 +90,7 @@ class Bench:
 
     def __init__(
         self, slots: tuple[Slot, ...], *, keyframes: int | None, register: bool, queue: str, costs: dict,
-        in_background: bool = False,
+        in_background: bool = False, fuse: Fuser | None = None,
     ) -> None:  # fmt: skip
         prediction = None
         if keyframes is not None:
@@ -98,7 +99,7 @@ class Bench:
         self.slots, self.record = slots, Record(slots, Scorecard(classes), frozenset())
         capacity, newest_wins = parse_queue(queue)
         machine = Machine(
-            2, 1 if in_background else 2, ConstantCosts(costs), Mailbox(capacity, newest_wins),
+            2, 1 if in_background else 2, ConstantCosts(costs), Mailbox(capacity, newest_wins), fuse,
             in_background=in_background,
         )  # fmt: skip
         self.run = RealTimeRun(slots, AnswerRule(NumberSegmenter(), prediction), machine, self.record)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stsem.chance import generator
-from stsem.frame import Frame
+from stsem.frame import Frame, Segmentation
 from stsem.log.log import Loaded
 from stsem.replay.network import Background
 from stsem.result import FrameResult, Outcome
@@ -22,6 +22,16 @@ from .conftest import DELAY_NS, MS, PERIOD_NS, Bench, make_slots, numbered_truth
 
 Row = tuple[int, str, int | None, str, int | None]
 """(frame, outcome, keyframe, reason, answered)."""
+
+
+class Anything:
+    """A map that takes everything, and keeps nothing."""
+
+    def can_fuse(self, frame: Frame) -> bool:
+        return True
+
+    def __call__(self, frame: Frame, segmentation: Segmentation) -> None:
+        """Nothing."""
 
 
 def beside(bench: Bench) -> Background:
@@ -88,17 +98,22 @@ def test_ten_frames_by_hand() -> None:
 @given(
     count=st.integers(1, 30), every=st.integers(1, 6),
     costs=st.fixed_dictionaries({"register": st.integers(1, 50), "propagate": st.integers(1, 50)}),
-    segment=st.integers(1, 3000), broken=st.frozensets(st.integers(0, 29), max_size=5),
+    beside_ms=st.tuples(st.integers(1, 3000), st.integers(1, 300)),
+    broken=st.frozensets(st.integers(0, 29), max_size=5),
 )  # fmt: skip
 def test_no_answer_waits_for_the_network(
-    count: int, every: int, costs: dict[str, int], segment: int, broken: frozenset[int]
+    count: int, every: int, costs: dict[str, int], beside_ms: tuple[int, int], broken: frozenset[int]
 ) -> None:
-    """However slow the network: each answer takes what registering and predicting take, from the newest keyframe."""
-    prices = {name: cost * MS for name, cost in {**costs, "segment": segment}.items()}
-    slots = make_slots(count)
-    found = Bench(
-        slots, keyframes=every, register=True, queue="latest", costs=prices, in_background=True
-    ).play(broken)  # fmt: skip
+    """However slow the network and the map: each answer takes what registering and predicting take, and comes from the
+    newest keyframe; every choice ends once.
+    """
+    segment, fuse = beside_ms
+    prices = {name: cost * MS for name, cost in {**costs, "segment": segment, "fuse": fuse}.items()}
+    bench = Bench(
+        make_slots(count), keyframes=every, register=True, queue="latest", costs=prices, in_background=True,
+        fuse=Anything(),
+    )  # fmt: skip
+    found = bench.play(broken)
     results, background = list(found.record.results), beside(found)
     assert [r.index for r in results] == list(range(count))
     assert {r.outcome for r in results} <= {Outcome.PROPAGATED, Outcome.NO_SOURCE, Outcome.UNDECODABLE}
@@ -220,6 +235,6 @@ def test_waiting_keyframes_hold_two_images() -> None:
 
 def test_what_cannot_be_segmented_is_a_defect() -> None:
     """A policy must not choose what the segmenter refuses: the sum of the fates would not hold."""
-    background = Background(lambda frame, then: then(None), lambda frame: None)
+    background = Background(lambda frame, then, free: then(None), lambda frame: None)
     with pytest.raises(ValueError, match="frame 3 was chosen"):
         background.hand(Frame(3, 3, np.zeros((1, 1, 3), np.uint8)), "first")
