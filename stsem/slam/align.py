@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.pose import Pose, inverse
-from stsem.slam.planes import F32, PlaneGrid
+from stsem.slam.planes import F32, PlaneGrid, transformed
 from stsem.slam.rotations import exponential, logarithm
 
 F64 = npt.NDArray[np.float64]
@@ -25,11 +25,15 @@ TUKEY = 4.685
 """Residuals, in standard deviations as found, from which a point does not count: people walk, doors move."""
 FINEST = 0.1
 """The least standard deviation that is believed, as a share of SIGMA."""
+USUAL = 0.3
+"""The standard deviation of most, as a share of SIGMA, with which points and depth are weighed against each other."""
+HELD = 0.5
+"""Information of a direction that outliers may take with them before they are left out."""
 GATE = 0.05
 """Relative difference of inverse depth up to which a point may belong to a plane."""
-CORRELATED = 8.0
-"""Points whose errors are one and the same: neighbours share the camera's distortion. Information is divided by it."""
-SETTLED = 2e-5
+CORRELATED = 2.0
+"""Points, of every second cell, whose errors are one and the same: neighbours share the camera's distortion."""
+SETTLED = 1e-4
 """Metres and radians below which a step is the last."""
 SLICE = 256
 """Points per matrix product: small enough that BLAS never splits one between threads."""
@@ -86,10 +90,15 @@ class Agreement:
 
 @dataclass(frozen=True, eq=False)
 class Aligned:
-    """A pose, and how it agrees with the first reference."""
+    """A pose, and how it agrees with each of the references (before the last step, which is small)."""
 
     T_WC: Pose
-    agreement: Agreement
+    agreements: tuple[Agreement, ...]
+
+    @property
+    def agreement(self) -> Agreement:
+        """That with the first reference."""
+        return self.agreements[0]
 
 
 def align(
@@ -98,12 +107,12 @@ def align(
     """The pose at which points lie on the planes of the references.
 
     Args:
-        points: rounds from coarse to fine, ((n, 3) points in the camera, largest number of steps) each.
+        points: rounds from coarse to fine, ((n, 3) points in the camera, largest number of steps) each; at least one.
         references: at least one.
         start: (4, 4) T_WC to begin at.
         opinion: counts where the planes do not say, as along a wall.
     """
-    pose = start
+    pose, found = start, list[Agreement]()
     for xyz, steps in points:
         for _ in range(steps):
             found = [agreement(xyz, reference, pose) for reference in references]
@@ -116,28 +125,32 @@ def align(
             pose = moved(pose, step)
             if np.abs(step).max() < SETTLED:
                 break
-    return Aligned(pose, agreement(points[-1][0], references[0], pose))
+    return Aligned(pose, tuple(found))
 
 
 def agreement(xyz: F32, reference: Reference, T_WC: Pose) -> Agreement:
     """How points (n, 3) of a camera at `T_WC` agree with the planes of a reference."""
-    T = inverse(reference.T_WC) @ T_WC
-    R, t = T[:3, :3].astype(np.float32), T[:3, 3].astype(np.float32)
-    there = xyz[:, :1] * R[:, 0] + xyz[:, 1:2] * R[:, 1] + xyz[:, 2:] * R[:, 2] + t
+    T = (inverse(reference.T_WC) @ T_WC).astype(np.float32)
+    there = transformed(xyz, T)
     rows, cells = reference.grid.cells(there)
-    planes, z = reference.grid.planes[cells], there[rows, 2]
+    planes, z = reference.grid.planes.take(cells, axis=0), there[:, 2].take(rows)
     near = np.flatnonzero((planes[:, 4] > 0) & (np.abs(planes[:, 4] * z - 1) < GATE))
     if not len(near):
         return Agreement(np.zeros((6, 6)), np.zeros(6), 0.0, np.inf)
-    p, n, d, z = xyz[rows[near]], planes[near, :3], planes[near, 3], z[near]
-    q = there[rows[near]]
+    rows, z = rows[near], z[near]
+    nx, ny, nz, d = (planes[:, k][near] for k in range(4))
+    qx, qy = there[:, 0].take(rows), there[:, 1].take(rows)
     sigma = np.float32(SIGMA) * d * z + np.float32(FLOOR_M)
-    residual = n[:, 0] * q[:, 0] + n[:, 1] * q[:, 1] + n[:, 2] * q[:, 2] - d
+    residual = nx * qx + ny * qy + nz * z - d
     size = np.abs(residual) / sigma
-    weight = _biweight(size) / (sigma * sigma * np.float32(CORRELATED))
-    normal = n[:, :1] * R[0] + n[:, 1:2] * R[1] + n[:, 2:] * R[2]
-    system = _normal_equations(p, normal, residual, weight)
-    return Agreement(system[:6, :6], system[:6, 6], len(near) / len(xyz), float(np.median(size)))
+    typical = float(np.partition(size, len(size) // 2)[len(size) // 2])
+    weight = np.float32(1) / (sigma * sigma * np.float32(CORRELATED * USUAL**2))
+    normal = [nx * T[0, k] + ny * T[1, k] + nz * T[2, k] for k in range(3)]
+    equations = _equations([xyz[:, k].take(rows) for k in range(3)], normal, residual)
+    system, robust = _summed(equations, weight), _summed(equations, weight * _biweight(size, typical))
+    if _leans_on_outliers(system[:6, :6], robust[:6, :6]):
+        system = robust
+    return Agreement(system[:6, :6], system[:6, 6], len(near) / len(xyz), typical)
 
 
 def moved(pose: Pose, step: F64) -> Pose:
@@ -156,26 +169,42 @@ def difference(origin: Pose, pose: Pose) -> F64:
     return np.concatenate([pose[:3, :3].T @ (pose[:3, 3] - origin[:3, 3]), logarithm(turn[None])[0]])
 
 
-def _biweight(size: F32) -> F32:
-    """Tukey's biweight of residuals over their variance, both in units of SIGMA; their scale is that of the median."""
-    scale = np.float32(np.clip(1.4826 * np.median(size), FINEST, 1.0))
+def _biweight(size: F32, typical: float) -> F32:
+    """Tukey's biweight of residuals in units of SIGMA; their scale is that of the median."""
+    scale = np.float32(np.clip(1.4826 * typical, FINEST, 1.0))
     inside = np.maximum(np.float32(0), 1 - np.square(size / (np.float32(TUKEY) * scale)))
-    return np.asarray(inside * inside / (scale * scale), np.float32)
+    return np.asarray(inside * inside, np.float32)
 
 
-def _normal_equations(p: F32, n: F32, residual: F32, weight: F32) -> F64:
-    """(7, 7) J^T W J with J = (n, p x n, residual), summed in slices in a fixed order."""
-    count = -(-len(p) // SLICE) * SLICE
-    J = np.zeros((count, 7), np.float32)
-    rows = J[: len(p)]
-    rows[:, :3] = n
-    rows[:, 3] = p[:, 1] * n[:, 2] - p[:, 2] * n[:, 1]
-    rows[:, 4] = p[:, 2] * n[:, 0] - p[:, 0] * n[:, 2]
-    rows[:, 5] = p[:, 0] * n[:, 1] - p[:, 1] * n[:, 0]
-    rows[:, 6] = residual
-    weighted = J.copy()
-    weighted[: len(p)] *= weight[:, None]
-    slices = J.reshape(-1, SLICE, 7)
-    products = np.swapaxes(weighted.reshape(-1, SLICE, 7), 1, 2) @ slices
+def _leans_on_outliers(whole: F64, robust: F64) -> bool:
+    """Whether some direction of the pose loses so much of its information with the outliers.
+
+    A person who walks along a corridor is then all that holds the camera. Elsewhere every point counts: tails that are
+    the sensor's own distortion pull to all sides, and leaving them out puts drift in their place.
+    """
+    L = np.linalg.cholesky(whole + np.eye(6))
+    kept = np.linalg.solve(L, np.linalg.solve(L, robust + np.eye(6)).T)
+    return bool(np.linalg.eigvalsh(kept)[0] < HELD)
+
+
+def _equations(p: list[F32], n: list[F32], residual: F32) -> F32:
+    """(slices, 7, SLICE) J^T = (n, p x n, residual) of the points, filled up with zeros."""
+    slices = -(-len(residual) // SLICE)
+    J = np.zeros((7, slices * SLICE), np.float32)
+    columns = J[:, : len(residual)]
+    columns[:3] = n
+    columns[3] = p[1] * n[2] - p[2] * n[1]
+    columns[4] = p[2] * n[0] - p[0] * n[2]
+    columns[5] = p[0] * n[1] - p[1] * n[0]
+    columns[6] = residual
+    return J.reshape(7, slices, SLICE).swapaxes(0, 1)
+
+
+def _summed(equations: F32, weight: F32) -> F64:
+    """(7, 7) J^T W J, summed in slices in a fixed order."""
+    slices = len(equations)
+    weights = np.zeros((slices, 1, SLICE), np.float32)
+    weights.reshape(-1)[: len(weight)] = weight
+    products = (equations * weights) @ equations.swapaxes(1, 2)
     total: F64 = products.astype(np.float64).sum(axis=0)
     return total

@@ -74,7 +74,7 @@ def find_landmarks(image: Image, depth: Depth | None, camera: Camera, *, most: i
     height, width = image.shape[:2]
     scale = min(1.0, WORKING_SIDE / max(width, height))
     size = max(1, round(width * scale)), max(1, round(height * scale))
-    grey = cv2.resize(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), size, interpolation=cv2.INTER_AREA)
+    grey = cv2.cvtColor(cv2.resize(image, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
     if min(size) < SMALLEST:
         return NOTHING
     keypoints, descriptors = _detector(most).detectAndCompute(grey, None)

@@ -50,7 +50,7 @@ class PlaneGrid:
         z = 1 / w[known]
         x, y = _rays(self.camera)
         across, down = np.broadcast_to(x[None, ::step], w.shape), np.broadcast_to(y[::step, None], w.shape)
-        return np.stack([across[known] * z, down[known] * z, z], axis=1)
+        return _columns(*(np.asarray(part, np.float32) for part in (across[known] * z, down[known] * z, z)))
 
     def cells(self, xyz: F32) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
         """(rows of `xyz` (n, 3) that fall into the grid, the cells they fall into), both (m,)."""
@@ -75,9 +75,9 @@ class PlaneGrid:
         x, y = _rays(self.camera)
         ray_x, ray_y = x[known % self.camera.width], y[known // self.camera.width]
         mine = self.planes[known, 4]
-        xyz = np.stack([ray_x / mine, ray_y / mine, 1 / mine], axis=1)
+        xyz = _columns(ray_x / mine, ray_y / mine, 1 / mine)
         back = inverse(T_self_other).astype(np.float32)
-        rows, cells = other.cells(_moved(xyz, back))
+        rows, cells = other.cells(transformed(xyz, back))
         n, d = _moved_planes(other.planes[cells], T_self_other)
         known, mine = known[rows], mine[rows]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -115,6 +115,12 @@ def plane_grid(depth: Depth, camera: Camera) -> PlaneGrid:
     return PlaneGrid(coarse, inverse_depth, good.astype(np.float32), _planes(inverse_depth, coarse))
 
 
+def transformed(xyz: F32, T: npt.NDArray[np.float32]) -> F32:
+    """T (4, 4) applied to points (n, 3), without BLAS: the same bytes for any number of threads."""
+    x, y, z = xyz[:, 0], xyz[:, 1], xyz[:, 2]
+    return _columns(*(x * T[k, 0] + y * T[k, 1] + z * T[k, 2] + T[k, 3] for k in range(3)))
+
+
 def _planes(w: F32, camera: Camera) -> F32:
     """A plane is 1/z = a x + b y + c with a, b, c = n / d in coordinates x, y of the ray (x, y, 1)."""
     window = np.ones((3, 3), np.uint8)
@@ -142,18 +148,16 @@ def _block_means(image: F32, width: int, height: int) -> F32:
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _moved(xyz: F32, T: npt.NDArray[np.float32]) -> F32:
-    """T applied to points (n, 3), without BLAS: the same bytes for any number of threads."""
-    x, y, z = xyz[:, :1], xyz[:, 1:2], xyz[:, 2:]
-    moved: F32 = x * T[:3, 0] + y * T[:3, 1] + z * T[:3, 2] + T[:3, 3]
-    return moved
+def _columns(x: F32, y: F32, z: F32) -> F32:
+    """(n, 3) with each column in one piece of memory: arithmetic on columns is several times as fast."""
+    return np.stack([x, y, z]).T
 
 
 def _moved_planes(planes: F32, T: Pose) -> tuple[F32, F32]:
     """Normals (n, 3) and distances (n,) of planes (n, 5) seen from the frame that `T` leads to."""
     turn = np.eye(4, dtype=np.float32)
     turn[:3, :3] = T[:3, :3]
-    n = _moved(planes[:, :3], turn)
+    n = transformed(planes[:, :3], turn)
     t = T[:3, 3].astype(np.float32)
     distance: F32 = planes[:, 3] + n[:, 0] * t[0] + n[:, 1] * t[1] + n[:, 2] * t[2]
     return n, distance

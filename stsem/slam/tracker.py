@@ -16,19 +16,21 @@ from stsem.slam.planes import PlaneGrid, plane_grid
 from stsem.slam.posegraph import Edge
 from stsem.slam.recognise import most_alike
 from stsem.slam.sighting import Sighting, sighting
+from stsem.slam.verify import MIN_AGREEMENT, MIN_OVERLAP, depth_agreement
 from stsem.slam.zoom import Zoom
 
 MAX_TRANSLATION_M, MAX_ROTATION_DEG, MIN_KEYFRAME_SHARE = 0.15, 12.0, 0.6
 """A frame farther from its keyframe, or that sees less of it, becomes a keyframe."""
 NEIGHBOURS = 6
 """Keyframes that a new one is aligned to: those that share most of what it sees."""
+PROMOTION_STEPS = 6
+"""Largest number of steps of a new keyframe's alignment to all of them at once."""
 MIN_SHARE, MAX_RESIDUAL, MIN_INFORMATION = 0.3, 1.0, 100.0
 """Less agreement of depth is lost. Information: a standard deviation of 10 cm or 0.1 rad in the worst direction."""
 MIN_INLIERS = 20
 """Points on which a pose is believed with no depth to confirm it."""
 MIN_RELOCALISED_INLIERS = 12
 """Points on which depth is asked whether a lost camera is where they say."""
-MIN_RELOCALISED_SHARE = 0.5
 MIN_POINTS = 500
 """Cells with a plane below which a frame counts as without depth."""
 MIN_SIGHTED = 12
@@ -157,13 +159,15 @@ class Tracker:
     def _relocalise(self, view: _View) -> Tracked:
         if view.grid is None:
             return self._lose("lost, and no depth to be found again by")
-        for position in most_alike(view.landmarks, [one.landmarks for one in self.keyframes], CANDIDATES):
+        alike = most_alike(view.landmarks, [one.landmarks for one in self.keyframes], CANDIDATES)
+        for position in dict.fromkeys([self._current, *alike]):  # a camera is seldom far from where it was lost
             keyframe = self.keyframes[position]
             seen = resect(keyframe.landmarks, view.landmarks, self._camera, seed=self._draw(view, position))
             if seen is None or seen.inliers < MIN_RELOCALISED_INLIERS:
                 continue
             found, points = self._refined(view.grid, keyframe, seen, keyframe.T_WC @ seen.T_KC)
-            if found.agreement.share >= MIN_RELOCALISED_SHARE and not _doubt(found.agreement, seen):
+            overlap, same = depth_agreement(keyframe.grid, view.grid, inverse(keyframe.T_WC) @ found.T_WC)
+            if overlap >= MIN_OVERLAP and same >= MIN_AGREEMENT and not _doubt(found.agreement, seen):
                 self._current, self._T_KC = position, inverse(keyframe.T_WC) @ found.T_WC
                 return self._accept(view, found, seen, points, Status.RELOCALISED)
         return self._lose("lost, and no keyframe recognised")
@@ -180,14 +184,14 @@ class Tracker:
         points = None if seen is None else sighting(seen, keyframe.T_WC, self._camera, likely, self._zoom.spread)
         if points is not None and len(points.xy) < MIN_SIGHTED:
             points = None
-        found = align([(grid.points(2), 4), (grid.points(), 2)], [keyframe.reference], likely[0], points)
+        found = align([(grid.points(4), 4), (grid.points(2), 3)], [keyframe.reference], likely[0], points)
         if points is not None and not self._zoom.settled:
             self._learn_zoom(grid, keyframe, points, found)
         return found, points
 
     def _learn_zoom(self, grid: PlaneGrid, keyframe: Keyframe, points: Sighting, found: Aligned) -> None:
         """Compares the flow of points with the motion that depth finds without them, where that is sure."""
-        alone = align([(grid.points(2), 4)], [keyframe.reference], found.T_WC)
+        alone = align([(grid.points(2), 3)], [keyframe.reference], found.T_WC)
         if float(np.linalg.eigvalsh(alone.agreement.information)[0]) < SURE_INFORMATION:
             return
         before = points.errors(keyframe.T_WC)[1] + points.xy
@@ -223,15 +227,15 @@ class Tracker:
 
     def _promote(self, view: _View, grid: PlaneGrid, T_WC: Pose, seen: Sighting | None) -> Pose:
         """Makes the frame a keyframe: aligned to its neighbours all at once, with an edge to each. Returns its pose."""
-        coarse = grid.points(4)
+        coarse = grid.points(8)
         shares = [agreement(coarse, one.reference, T_WC).share for one in self.keyframes]
         best = np.argsort(-np.array(shares), kind="stable")[:NEIGHBOURS]
         chosen = [int(one) for one in best if shares[one] >= MIN_SHARE or one == self._current]
         references = [self.keyframes[one].reference for one in chosen]
-        points = grid.points()
-        pose = align([(points, 6)], references, T_WC, seen).T_WC
-        for position, reference in zip(chosen, references, strict=True):
-            information = agreement(points, reference, pose).information + np.eye(6)
+        found = align([(grid.points(2), PROMOTION_STEPS)], references, T_WC, seen)
+        pose = found.T_WC
+        for position, reference, agreed in zip(chosen, references, found.agreements, strict=True):
+            information = agreed.information + np.eye(6)
             if seen is not None and position == self._current:
                 information = information + seen.system(pose)[0]
             self.edges.append(Edge(position, len(self.keyframes), inverse(reference.T_WC) @ pose, information))
