@@ -36,9 +36,9 @@ def adopt(
 ) -> int:  # fmt: skip
     """Write OUT.onnx and OUT.toml, and load them as a replay does."""
     from stsem.cli.export import sidecar_of
-    from stsem.errors import MissingExtraError, OutputError, UsageError
+    from stsem.errors import MissingExtraError, UsageError
     from stsem.inference.network import CHANNELS, CLASS_COUNT, load_network
-    from stsem.inference.sidecar import render
+    from stsem.inference.placing import placed
 
     try:
         from stsem.models.adopt import Told
@@ -51,17 +51,12 @@ def adopt(
         raise UsageError(f"There is no layout {layout!r}; choose nchw (channels first) or nhwc (channels last).")
     form = sidecar_of(sidecar)
     told = Told(_roles(input_ or []), output, cast(Literal["nchw", "nhwc"] | None, layout), bgr)
-    found = adopt_network(
-        network, out, told, size=form.size, classes=len(form.classes), metadata={CLASS_COUNT: str(len(form.classes))},
-        inputs={role: CHANNELS[role] for role in form.inputs},
-    )  # fmt: skip
-    beside = out.with_suffix(".toml")
-    if beside.resolve() != sidecar.resolve():  # else the user's own, with comments
-        try:
-            beside.write_text(render(form), encoding="utf-8")
-        except OSError as err:
-            raise OutputError(f"The sidecar {beside} cannot be written: {err.strerror}.") from err
-    load_network(out)
+    with placed(out, form) as unchecked:
+        found = adopt_network(
+            network, unchecked, told, size=form.size, classes=len(form.classes),
+            metadata={CLASS_COUNT: str(len(form.classes))}, inputs={role: CHANNELS[role] for role in form.inputs},
+        )  # fmt: skip
+        load_network(unchecked)
     print("Found:   " + "\n         ".join(found))
     width, height = form.size
     print(f"Network: {out} ({out.stat().st_size / 1e6:.1f} MB, {len(form.classes)} classes, {width}x{height})")

@@ -32,7 +32,8 @@ class Objective:
         weights: (C,) class weights, on the network's device.
         bf16: run the convolutions in bfloat16; the loss is float32 all the same.
         fine: the loss is taken on every `fine`-th pixel; where that divides both sides less one, these are grid points
-            of the enlargement with aligned corners.
+            of the enlargement with aligned corners. An answer on a finer grid than that is judged at every pixel: a
+            transposed convolution learns each phase of its stride on its own, and those between would learn nothing.
     """
 
     weights: Tensor
@@ -44,18 +45,19 @@ class Objective:
         # The cache of casts is one for all threads: without it a weight used twice gets its gradients in one order.
         with torch.autocast(labels.device.type, torch.bfloat16, enabled=self.bf16, cache_enabled=False):
             answers = network.answers(*inputs)
-        fine = labels[:, :: self.fine, :: self.fine]
-        loss = self._of_probabilities(answers.probabilities, fine)
+        loss = self._of_probabilities(answers.probabilities, labels)
         for side in answers.sides:
             if side.enlarged:
-                loss = loss + side.weight * self._of_probabilities(softmax(side.logits), fine)
+                loss = loss + side.weight * self._of_probabilities(softmax(side.logits), labels)
             else:
                 logarithms = functional.log_softmax(side.logits.float(), 1)
                 loss = loss + side.weight * self._entropy(logarithms, _at_grid(labels, side.logits))
         return loss
 
     def _of_probabilities(self, probabilities: Tensor, labels: Tensor) -> Tensor:
-        return self._entropy(_enlarged(probabilities, labels).clamp_min(1e-6).log(), labels)
+        fine = labels[:, :: self.fine, :: self.fine]
+        judged = labels if probabilities.shape[-1] > fine.shape[-1] else fine
+        return self._entropy(_enlarged(probabilities, judged).clamp_min(1e-6).log(), judged)
 
     def _entropy(self, logarithms: Tensor, labels: Tensor) -> Tensor:
         """Mean over the labelled pixels by their weights; 0 where a view shows none, as beyond the image's border."""

@@ -1,19 +1,16 @@
 """A checkpoint -> the two files that a user runs: ONNX and sidecar, checked against torch."""
 
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from stsem import chance
-from stsem.aside import aside
-from stsem.errors import NetworkError, OutputError
+from stsem.errors import NetworkError
 from stsem.inference.network import CLASS_COUNT, Network, load_network
+from stsem.inference.placing import placed
 from stsem.inference.preprocess import network_inputs
-from stsem.inference.sidecar import Sidecar, parse, render
+from stsem.inference.sidecar import Sidecar
 from stsem.models.export import Agreement, agreement, exported
 from stsem.models.network import SegmentationNetwork
 from stsem.models.zoo import build
@@ -57,44 +54,15 @@ def publish(network: SegmentationNetwork, sidecar: Sidecar, path: Path, *, passe
         raise NetworkError(
             "The network takes the image difference, but its sidecar has no section [difference]; add one with a scale."
         )
-    with _trial_folder(path) as trial:
+    with placed(path, described) as unchecked:
         metadata = {CLASS_COUNT: str(len(sidecar.classes))}
-        (trial / path.name).write_bytes(exported(network, size=sidecar.size, metadata=metadata, passes=passes))
-        (trial / path.name).with_suffix(".toml").write_text(render(described), encoding="utf-8")
-        found = _agreement_on_noise(network, load_network(trial / path.name), passes)
+        unchecked.write_bytes(exported(network, size=sidecar.size, metadata=metadata, passes=passes))
+        found = _agreement_on_noise(network, load_network(unchecked), passes)
         if not found.holds:
             raise NetworkError(
                 f"The network as exported does not answer as torch does: equal are {found}; {path} was not written."
             )
-        _replace(path, trial, described)
     return load_network(path)
-
-
-@contextmanager
-def _trial_folder(path: Path) -> Iterator[Path]:
-    """A folder beside `path` while both files are made and checked. Raises OutputError for an OSError inside."""
-    trial = aside(path)
-    try:
-        trial.mkdir()
-        yield trial
-    except OSError as err:
-        raise OutputError(f"The network cannot be written to {path}: {err.strerror}.") from err
-    finally:
-        shutil.rmtree(trial, ignore_errors=True)
-
-
-def _replace(path: Path, trial: Path, sidecar: Sidecar) -> None:
-    """Move both files into place; a sidecar that says the same already stays, with its comments."""
-    beside = path.with_suffix(".toml")
-    if not _says(beside, sidecar):
-        (trial / beside.name).replace(beside)
-    (trial / path.name).replace(path)
-
-
-def _says(beside: Path, sidecar: Sidecar) -> bool:
-    with suppress(FileNotFoundError, UnicodeDecodeError, NetworkError):
-        return parse(beside.read_text(encoding="utf-8"), str(beside)) == sidecar
-    return False
 
 
 def _agreement_on_noise(network: SegmentationNetwork, published: Network, passes: int) -> Agreement:

@@ -40,7 +40,7 @@ class Recipe:
         clip: largest norm of the gradient of all weights together; 0 for any.
         freeze_norm: batch normalisation keeps the statistics that it came with, where weights were given.
         balance: class weights are share ** -balance, scaled so that their mean over pixels is 1.
-        fine: the loss is taken on every `fine`-th pixel in both directions.
+        fine: the loss is taken on every `fine`-th pixel in both directions, where the network's own grid is no finer.
         average: factor of the running mean of the weights, which is what gets published; 0 for the last weights.
         checkpoint_every, report_every, validate_every: iterations between these.
     """

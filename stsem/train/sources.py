@@ -65,12 +65,13 @@ def open_source(parts: Sequence[str], how: Reading) -> Source:
     folder = Path(parts[0])
     if is_url(parts[0]) or not folder.is_dir():
         return _log(parts, how)
+    unused = f"--topic says nothing of the folder {folder}." if how.topics else ""
     if is_image_folder(folder):
         images = ImagePairs(folder, _table(folder, how.classes_file), depth=how.depth)
         lost = f"Label images of {folder} that belong to no image: {images.orphans}." if images.orphans else ""
-        return _source(str(folder), images, images.classes, lost)
+        return _source(str(folder), images, images.classes, lost, unused)
     if any(folder.glob("*.npz")):
-        return _source(str(folder), PairFolder(folder), _plain(_table(folder, how.classes_file)))
+        return _source(str(folder), PairFolder(folder), _plain(_table(folder, how.classes_file)), unused)
     if any(folder.rglob("*.mcap")):
         return _log(parts, how)
     raise TrainingError(f"The folder {folder} holds no log (*.mcap), no pairs (*.npz), and no folders images and "

@@ -9,6 +9,7 @@ pytest.importorskip("torch", reason="the extra 'train' is not installed")
 
 from onnx import TensorProto, helper
 
+from stsem.errors import NetworkError
 from stsem.inference.network import load_network
 
 from .conftest import Cli
@@ -65,6 +66,23 @@ def test_what_cannot_be(cli: Cli, theirs: Path, arguments: tuple[str, ...], code
     ran = cli("adopt", theirs, *arguments)
     assert ran.code == code
     assert sentence in ran.sentence
+
+
+def test_what_was_there_stays_until_the_new_one_is_checked(
+    cli: Cli, theirs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the adopted network turns out not to load."""
+
+    def refuse(path: Path) -> None:
+        raise NetworkError("It does not load.")
+
+    Path("old.onnx").write_bytes(b"old")
+    Path("old.toml").write_text("# old")
+    monkeypatch.setattr("stsem.inference.network.load_network", refuse)
+    ran = cli("adopt", theirs, "old.onnx", "--sidecar", "mine.toml", "--output", "out")
+    assert (ran.code, ran.sentence) == (1, "It does not load.")
+    assert (Path("old.onnx").read_bytes(), Path("old.toml").read_text()) == (b"old", "# old")
+    assert sorted(path.name for path in Path().iterdir()) == ["mine.toml", "old.onnx", "old.toml", "theirs.onnx"]
 
 
 def test_a_replay_points_to_it(cli: Cli, theirs: Path, tiny_log: Path) -> None:

@@ -16,6 +16,7 @@ pytest.importorskip("onnx", reason="the extra 'train' is not installed")
 
 from stsem.classes import ClassSet
 from stsem.frame import Frame
+from stsem.inference import placing
 from stsem.inference.inferencer import Inferencer
 from stsem.inference.network import load_network
 from stsem.inference.sidecar import DepthForm, Difference, Sidecar, render
@@ -81,7 +82,7 @@ def test_a_failed_export_leaves_what_was_there(
         ran = cli(*arguments)
         assert (ran.code, ran.err.count("\n")) == (1, 1)
         assert "does not answer as torch does: equal are 50.0000% of the labels" in ran.err
-        patch.setattr(publish, "render", _full_disk)
+        patch.setattr(placing, "render", _full_disk)
         ran = cli(*arguments)
         assert ran.err == f"stsem: The network cannot be written to {out}: No space left on device.\n"
     assert (out.read_bytes(), beside.read_text()) == (b"a good network", "# its sidecar")

@@ -36,6 +36,23 @@ def test_side_answers_are_judged_on_their_own_grid() -> None:
     assert Objective(torch.ones(3))(Said(), [], labels).item() == pytest.approx(1.9 * at_grid.item(), rel=1e-5)
 
 
+@pytest.mark.parametrize(("height", "width", "every_pixel"), [(5, 9, True), (3, 5, False)])
+def test_an_answer_at_every_pixel_is_judged_at_every_pixel(height: int, width: int, every_pixel: bool) -> None:
+    """By the phases of 5x9 labels: between the judged pixels a coarse answer is enlarged, a fine one would be free."""
+    probabilities = torch.full((1, 2, height, width), 0.5, requires_grad=True)
+
+    class Said(SegmentationNetwork):
+        def answers(self, *inputs: torch.Tensor) -> Answers:
+            return Answers(probabilities)
+
+    Objective(torch.ones(2), fine=2)(Said(), [], torch.zeros(1, 5, 9, dtype=torch.int64)).backward()
+    assert probabilities.grad is not None
+    taught = probabilities.grad[0, 0] != 0
+    assert taught.all()
+    each = -2.0 / (45 if every_pixel else 15)
+    assert probabilities.grad[0, 0].flatten().tolist() == pytest.approx([each] * (height * width), rel=1e-4)
+
+
 def test_a_view_without_labels_teaches_nothing() -> None:
     """As when a crop lies beyond the image: the loss is 0, not a number that is none; weights count as in torch."""
     logits = torch.randn(2, 3, 5, 9, requires_grad=True)

@@ -253,6 +253,8 @@ def test_labels_beyond_the_class_table_are_not_lost_in_silence(tmp_path: Path) -
     (tmp_path / "classes.txt").write_text("dark\nred\ngreen\n")
     whole = open_source([str(tmp_path)], Reading(tmp_path))
     assert join([whole], whole.classes, {}).pair(1).labelled == (0, 1)
+    chosen = open_source([str(tmp_path)], Reading(tmp_path, topics={"color": "/camera/color"}))
+    assert chosen.notes == (f"--topic says nothing of the folder {tmp_path}.",)
     (tmp_path / "classes.txt").write_text("dark\nred\n")
     source = open_source([str(tmp_path)], Reading(tmp_path))
     with pytest.raises(TrainingError, match=r"Pair 1 of .* with the label 2, but its class table has 2 classes"):
