@@ -195,6 +195,20 @@ def _other_method(context: Context) -> list[str]:
     ]
 
 
+def _second_keyframe(context: Context) -> list[str]:
+    """That profiles know what it takes to register a frame to one keyframe, not to two."""
+    profile, config = None if context.costing is None else context.costing.profile, context.config
+    points = policy_of(config).needs_homography or PROPAGATIONS[config.propagation].needs.points
+    if profile is None or not points:
+        return []
+    return [
+        f"{mode.name} registers a frame to two keyframes while a newer one is on its way, but the cost profile was "
+        "measured with one: its durations of `register` are too short."
+        for mode in config.modes
+        if mode.in_background
+    ]
+
+
 def _warnings(context: Context) -> tuple[str, ...]:
     found = [*map(str, context.log.info.warnings), *context.notes]
     if sentence := context.replayed.posing.sentence:
@@ -219,7 +233,7 @@ def _warnings(context: Context) -> tuple[str, ...]:
     costing = context.costing
     if costing is not None and costing.profile is not None and costing.profile.disturbed:
         found.append("The cost profile was measured while other work held a core; its durations are too long.")
-    found += _foreign_costs(context) + _other_method(context)
+    found += _foreign_costs(context) + _other_method(context) + _second_keyframe(context)
     if context.config.costs == "measured" and context.config.clock == "real-time":
         found.append("Durations were measured as they happened on this machine: timing does not repeat.")
     return tuple(found)
