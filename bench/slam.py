@@ -29,7 +29,7 @@ from stsem.slam.tracker import Tracked
 F64 = npt.NDArray[np.float64]
 PARTS = (
     (tracker, "find_landmarks"), (tracker, "plane_grid"), (tracker, "resect"), (tracker, "align"),
-    (tracker.Tracker, "_promote"), (tracker, "most_alike"), (loops.Loops, "add"), (system, "relax"),
+    (tracker.Tracker, "_promote"), (tracker, "most_alike"), (loops, "verify"), (loops.Loops, "add"), (system, "relax"),
 )  # fmt: skip
 
 

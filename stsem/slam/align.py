@@ -128,18 +128,18 @@ def align(
     return Aligned(pose, tuple(found))
 
 
+def shared(xyz: F32, reference: Reference, T_WC: Pose) -> float:
+    """Share of the points (n, 3) of a camera at `T_WC` that meet a plane of the reference near them, 0..1."""
+    return len(_met(xyz, reference, T_WC)[0]) / max(1, len(xyz))
+
+
 def agreement(xyz: F32, reference: Reference, T_WC: Pose) -> Agreement:
     """How points (n, 3) of a camera at `T_WC` agree with the planes of a reference."""
-    T = (inverse(reference.T_WC) @ T_WC).astype(np.float32)
-    there = transformed(xyz, T)
-    rows, cells = reference.grid.cells(there)
-    planes, z = reference.grid.planes.take(cells, axis=0), there[:, 2].take(rows)
-    near = np.flatnonzero((planes[:, 4] > 0) & (np.abs(planes[:, 4] * z - 1) < GATE))
-    if not len(near):
+    rows, planes, there, T = _met(xyz, reference, T_WC)
+    if not len(rows):
         return Agreement(np.zeros((6, 6)), np.zeros(6), 0.0, np.inf)
-    rows, z = rows[near], z[near]
-    nx, ny, nz, d = (planes[:, k][near] for k in range(4))
-    qx, qy = there[:, 0].take(rows), there[:, 1].take(rows)
+    nx, ny, nz, d = (planes[:, k] for k in range(4))
+    qx, qy, z = (there[:, k].take(rows) for k in range(3))
     sigma = np.float32(SIGMA) * d * z + np.float32(FLOOR_M)
     residual = nx * qx + ny * qy + nz * z - d
     size = np.abs(residual) / sigma
@@ -150,7 +150,7 @@ def agreement(xyz: F32, reference: Reference, T_WC: Pose) -> Agreement:
     system, robust = _summed(equations, weight), _summed(equations, weight * _biweight(size, typical))
     if _leans_on_outliers(system[:6, :6], robust[:6, :6]):
         system = robust
-    return Agreement(system[:6, :6], system[:6, 6], len(near) / len(xyz), typical)
+    return Agreement(system[:6, :6], system[:6, 6], len(rows) / len(xyz), typical)
 
 
 def moved(pose: Pose, step: F64) -> Pose:
@@ -169,6 +169,17 @@ def difference(origin: Pose, pose: Pose) -> F64:
     return np.concatenate([pose[:3, :3].T @ (pose[:3, 3] - origin[:3, 3]), logarithm(turn[None])[0]])
 
 
+def _met(xyz: F32, reference: Reference, T_WC: Pose) -> tuple[npt.NDArray[np.intp], F32, F32, F32]:
+    """(rows of points that meet a plane (m,), the planes (m, 5), all points in the reference (n, 3), T (4, 4))."""
+    T = (inverse(reference.T_WC) @ T_WC).astype(np.float32)
+    there = transformed(xyz, T)
+    rows, cells = reference.grid.cells(there)
+    inverse_depth = reference.grid.planes[:, 4].take(cells)
+    near = np.flatnonzero((inverse_depth > 0) & (np.abs(inverse_depth * there[:, 2].take(rows) - 1) < GATE))
+    planes = reference.grid.planes.take(cells.take(near), axis=0)
+    return rows.take(near), np.asarray(planes.T.copy().T), there, T
+
+
 def _biweight(size: F32, typical: float) -> F32:
     """Tukey's biweight of residuals in units of SIGMA; their scale is that of the median."""
     scale = np.float32(np.clip(1.4826 * typical, FINEST, 1.0))
@@ -182,9 +193,11 @@ def _leans_on_outliers(whole: F64, robust: F64) -> bool:
     A person who walks along a corridor is then all that holds the camera. Elsewhere every point counts: tails that are
     the sensor's own distortion pull to all sides, and leaving them out puts drift in their place.
     """
-    L = np.linalg.cholesky(whole + np.eye(6))
-    kept = np.linalg.solve(L, np.linalg.solve(L, robust + np.eye(6)).T)
-    return bool(np.linalg.eigvalsh(kept)[0] < HELD)
+    try:
+        np.linalg.cholesky(robust - HELD * whole + np.eye(6))  # exists where every direction keeps more than HELD
+    except np.linalg.LinAlgError:
+        return True
+    return False
 
 
 def _equations(p: list[F32], n: list[F32], residual: F32) -> F32:

@@ -18,7 +18,9 @@ from stsem.slam.rotations import F64, logarithm
 from stsem.slam.verify import Match, View, verify
 
 MIN_KEYFRAMES_BETWEEN = 12
-MAX_CANDIDATES = 3
+MAX_CANDIDATES = 2
+REST = 3
+"""Keyframes after a closed loop in which none is sought: odometry drifts little in them."""
 DRIFT_PER_METRE = 0.06
 DRIFT_FLOOR_M = 0.25
 DRIFT_DEG_PER_METRE = 2.0
@@ -51,7 +53,7 @@ class Loops:
 
     def __init__(self, seed: int) -> None:
         self.tried: list[Tried] = []
-        self._seed = seed
+        self._seed, self._rested = seed, 0
         self._recall = Recall()
         self._views: list[View] = []
 
@@ -67,9 +69,12 @@ class Loops:
         alike = self._recall.similarity(words)
         self._recall.add(words)
         self._views.append(view)
+        if here <= self._rested:
+            return []
         for candidate in self._candidates(alike, at):
             edges = self._confirmed(candidate, here, at)
             if edges:
+                self._rested = here + REST
                 return edges
         return []
 

@@ -51,14 +51,17 @@ class Recall:
         """(views,) 0..1: weight of the words shared, over that of all words of this view, a geometric mean of both."""
         if not len(self) or not len(words):
             return np.zeros(len(self))
-        rarity = np.log((len(self) + 1.0) / np.maximum(self._views_with, 1))
-        here = np.zeros(len(rarity))
-        here[words] = rarity[words]
+        rarity = np.log((len(self) + 1.0) / np.maximum(np.arange(len(self) + 1), 1)).astype(np.float32)[
+            self._views_with
+        ]
+        here = np.zeros(len(rarity), np.bool_)
+        here[words] = True
         stored = self._words[: self._starts[-1]]
-        shared, own = self._sums(here[stored]), self._sums(rarity[stored])
-        return np.asarray(shared / np.sqrt(np.maximum(own * float(rarity[words].sum()), 1e-12)))
+        weights = rarity[stored]
+        shared, own = self._sums(weights * here[stored]), self._sums(weights)
+        return np.asarray(shared / np.sqrt(np.maximum(own * float(rarity[words].sum(dtype=np.float64)), 1e-12)))
 
-    def _sums(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def _sums(self, values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
         """(views,) sums over the words of each; a view may have none."""
-        total = np.concatenate([[0.0], np.cumsum(values)])
+        total = np.concatenate([[0.0], np.cumsum(values, dtype=np.float64)])
         return np.asarray(np.diff(total[self._starts]))

@@ -24,6 +24,8 @@ PATCHES = 4.0
 """Parts of the image whose errors of registration differ, beyond shift, scale and turn: n points count as so many."""
 COMMON_AT = 0.3
 """Where in the image, in widths from its middle, a common scale or turn makes as much as a common shift."""
+TURNED = 0.2
+"""Error of flow to its side, as a share of that along it."""
 RAYLEIGH_MEDIAN = 1.177
 """Median length of a vector of two numbers with standard deviation 1."""
 
@@ -36,13 +38,14 @@ class Sighting:
         xyz: (n, 3) in the world, metres.
         xy: (n, 2) pixels of the camera.
         camera: without distortion.
-        common_px: standard deviation of an error that all share: of colour against depth, in shift, scale and turn.
+        common_px: standard deviation of errors that all share, of colour against depth: of a shift across, of one
+            down, and (their length) of a scale and a turn; none where 0.
     """
 
     xyz: F64
     xy: F64
     camera: Camera
-    common_px: float = 0.0
+    common_px: tuple[float, float] = (0.0, 0.0)
 
     def errors(self, T_WC: Pose) -> tuple[F64, F64]:
         """((n, 3) the points in a camera at `T_WC`, (n, 2) projected minus seen, pixels)."""
@@ -70,17 +73,19 @@ class Sighting:
         size = np.sqrt(np.square(r).sum(axis=1))
         sigma = max(LEAST_PX, float(np.median(size)) / RAYLEIGH_MEDIAN)
         inside = np.maximum(0.0, 1 - np.square(size / (TUKEY * sigma)))
-        shared = len(p) / PATCHES * self.common_px**2
-        weight = inside * inside / (sigma * sigma * CORRELATED + shared)
+        shared = len(p) / PATCHES * np.square(self.common_px)  # (2,)
+        weight = (inside * inside)[:, None] / (sigma * sigma * CORRELATED + shared)
         J = np.concatenate([self._jacobians(p), self._common_modes(), r[..., None]], axis=2)
-        whole = np.einsum("nki,nkj->ij", J * weight[:, None, None], J)
+        whole = np.einsum("nki,nkj->ij", J * weight[..., None], J)
         return self._without_common(whole)
 
     def _without_common(self, whole: F64) -> tuple[F64, F64]:
         """Information and gradient of the pose alone: what all points share is solved for and left out (Schur)."""
-        if self.common_px == 0:
+        across, down = self.common_px
+        length = np.hypot(across, down)
+        if length == 0:
             return whole[:6, :6], whole[:6, 10]
-        of_common = whole[6:10, 6:10] + np.eye(4) / self.common_px**2
+        of_common = whole[6:10, 6:10] + np.diag(1 / np.square(np.maximum([across, down, length, length], 1e-3)))
         part = np.linalg.solve(of_common, whole[6:10])
         reduced = whole[:6] - whole[:6, 6:10] @ part
         return reduced[:, :6], reduced[:, 10]
@@ -112,5 +117,6 @@ def sighting(seen: Resection, T_WK: Pose, camera: Camera, poses: list[Pose], mis
     xyz = x * T_WK[:3, 0] + y * T_WK[:3, 1] + z * T_WK[:3, 2] + T_WK[:3, 3]
     points = Sighting(xyz, seen.xy, camera).near(poses)
     flow = points.errors(T_WK)[1]
-    size = float(np.median(np.hypot(flow[:, 0], flow[:, 1]))) if len(flow) else 0.0
-    return replace(points, common_px=misregistered * size)
+    across, down = (float(np.median(np.abs(flow[:, k]))) if len(flow) else 0.0 for k in (0, 1))
+    turned = TURNED * float(np.hypot(across, down))  # what a turn of colour against depth makes of flow to the side
+    return replace(points, common_px=(misregistered * (across + turned), misregistered * (down + turned)))

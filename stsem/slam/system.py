@@ -12,6 +12,9 @@ from stsem.slam.posegraph import Edge, relax
 from stsem.slam.tracker import Status, Tracked, Tracker
 from stsem.slam.verify import View
 
+MAX_ITERATIONS = 15
+"""Of the graph's last round after a loop: a closed graph needs a few, and the next loop goes on from there."""
+
 
 @dataclass(frozen=True, eq=False)
 class Placed:
@@ -92,6 +95,8 @@ class Slam:
             return False
         self.closed += 1
         self._loop_edges += edges
-        relaxed = relax(np.array(poses), [*self._tracker.edges, *self._loop_edges])
+        relaxed = relax(
+            np.array(poses), [*self._tracker.edges, *self._loop_edges], max_iterations=MAX_ITERATIONS, tolerance=1e-5
+        )
         self._tracker.move(list(relaxed.poses))
         return True

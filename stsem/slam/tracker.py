@@ -9,7 +9,7 @@ from stsem.camera import Camera
 from stsem.chance import hash31
 from stsem.frame import Frame
 from stsem.pose import Pose, inverse
-from stsem.slam.align import Agreement, Aligned, agreement, align
+from stsem.slam.align import Agreement, Aligned, align, shared
 from stsem.slam.keyframe import Keyframe, is_far
 from stsem.slam.landmarks import FEW, MANY, Landmarks, Resection, find_landmarks, resect, zoomed
 from stsem.slam.planes import PlaneGrid, plane_grid
@@ -23,6 +23,7 @@ MAX_TRANSLATION_M, MAX_ROTATION_DEG, MIN_KEYFRAME_SHARE = 0.15, 12.0, 0.6
 """A frame farther from its keyframe, or that sees less of it, becomes a keyframe."""
 NEIGHBOURS = 6
 """Keyframes that a new one is aligned to: those that share most of what it sees."""
+NEIGHBOUR_M, NEIGHBOUR_COSINE = 3.0, 0.5
 PROMOTION_STEPS = 6
 """Largest number of steps of a new keyframe's alignment to all of them at once."""
 MIN_SHARE, MAX_RESIDUAL, MIN_INFORMATION = 0.3, 1.0, 100.0
@@ -180,7 +181,7 @@ class Tracker:
         if seen is not None and seen.inliers >= MIN_INLIERS:
             few = grid.points(4)
             likely.append(keyframe.T_WC @ seen.T_KC)
-            likely.sort(key=lambda pose: -agreement(few, keyframe.reference, pose).share)
+            likely.sort(key=lambda pose: -shared(few, keyframe.reference, pose))
         points = None if seen is None else sighting(seen, keyframe.T_WC, self._camera, likely, self._zoom.spread)
         if points is not None and len(points.xy) < MIN_SIGHTED:
             points = None
@@ -228,9 +229,11 @@ class Tracker:
     def _promote(self, view: _View, grid: PlaneGrid, T_WC: Pose, seen: Sighting | None) -> Pose:
         """Makes the frame a keyframe: aligned to its neighbours all at once, with an edge to each. Returns its pose."""
         coarse = grid.points(8)
-        shares = [agreement(coarse, one.reference, T_WC).share for one in self.keyframes]
+        shares = [
+            shared(coarse, one.reference, T_WC) if _looks_alike(one.T_WC, T_WC) else 0.0 for one in self.keyframes
+        ]
         best = np.argsort(-np.array(shares), kind="stable")[:NEIGHBOURS]
-        chosen = [int(one) for one in best if shares[one] >= MIN_SHARE or one == self._current]
+        chosen = [int(one) for one in best if shares[one] >= MIN_SHARE and one != self._current] + [self._current]
         references = [self.keyframes[one].reference for one in chosen]
         found = align([(grid.points(2), PROMOTION_STEPS)], references, T_WC, seen)
         pose = found.T_WC
@@ -261,6 +264,12 @@ class Tracker:
 
 def _lost(reason: str) -> Tracked:
     return Tracked(None, Status.LOST, None, reason=reason)
+
+
+def _looks_alike(one: Pose, other: Pose) -> bool:
+    """Whether two cameras are near and look much the same way, so that they may see the same surface."""
+    near = float(np.linalg.norm(one[:3, 3] - other[:3, 3])) < NEIGHBOUR_M
+    return near and float(one[:3, 2] @ other[:3, 2]) > NEIGHBOUR_COSINE
 
 
 def _doubt(found: Agreement, seen: Resection | None) -> str:

@@ -121,10 +121,13 @@ def _matches(a: npt.NDArray[np.uint8], b: npt.NDArray[np.uint8]) -> tuple[npt.ND
     if len(a) < 2 or len(b) < 2:
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
     distance, nearest = cv2.batchDistance(a, b, dtype=cv2.CV_32S, normType=cv2.NORM_HAMMING, K=2)
-    _, back = cv2.batchDistance(b, a, dtype=cv2.CV_32S, normType=cv2.NORM_HAMMING, K=2)
-    rows = np.arange(len(a))
-    good = (distance[:, 0] < MAX_RATIO * distance[:, 1]) & (back[nearest[:, 0], 0] == rows)
-    return rows[good], nearest[good, 0].astype(np.intp)
+    good = np.flatnonzero(distance[:, 0] < MAX_RATIO * distance[:, 1])
+    partners = nearest[good, 0].astype(np.intp)
+    if not len(good):
+        return good, partners
+    _, back = cv2.batchDistance(b[partners], a, dtype=cv2.CV_32S, normType=cv2.NORM_HAMMING, K=1)
+    mutual = back[:, 0] == good
+    return good[mutual], partners[mutual]
 
 
 def _solve(

@@ -32,7 +32,7 @@ def test_steps_lead_to_the_pose_in_spite_of_wrong_matches() -> None:
 def test_an_error_that_all_points_share_takes_their_say() -> None:
     """A shift by 3 pixels that is expected leaves less information, and a smaller step, than one that is not."""
     points = _seen(np.eye(4), 1, shift_px=3.0)
-    aware = Sighting(points.xyz, points.xy, CAMERA, common_px=3.0)
+    aware = Sighting(points.xyz, points.xy, CAMERA, common_px=(3.0, 3.0))
     trusting, wary = points.system(np.eye(4)), aware.system(np.eye(4))
     assert np.linalg.eigvalsh(trusting[0] - wary[0]).min() > 0
     assert abs(wary[1][4]) < 0.2 * abs(trusting[1][4])
