@@ -7,6 +7,7 @@ is the fixed interval with as many keyframes, linear between the two intervals a
 """
 
 import argparse
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -18,11 +19,18 @@ from bench.keyframes import Cell, read
 matplotlib.use("agg")
 from matplotlib import pyplot as plt
 
-KINDS = {"every": "fixed interval", "paper": "paper's rule", "coverage": "coverage", "budget": "budget"}
+KINDS = {
+    "every": "fixed interval",
+    "paper": "paper's rule",
+    "coverage": "coverage",
+    "budget": "budget",
+    "moved": "",
+    "covered": "",
+}
 
 
 def kind(cell: Cell) -> str:
-    return cell.policy.partition(":")[0].partition("*")[0]
+    return re.split(r"[:*/]", cell.policy)[0]
 
 
 def group(cells: Iterable[Cell], **wanted: object) -> list[Cell]:
@@ -52,7 +60,7 @@ def written(cells: list[Cell], cell: Cell | None) -> str:
 def table(cells: list[Cell], log: str, model: str) -> list[str]:
     some = [cell for cell in cells if (cell.log, cell.model, cell.partial) == (log, model, 0.0)]
     methods, policies = (list(dict.fromkeys(getattr(cell, name) for cell in some)) for name in ("method", "policy"))
-    policies.sort(key=lambda name: list(KINDS).index(name.partition(":")[0].partition("*")[0]))
+    policies.sort(key=lambda name: list(KINDS).index(re.split(r"[:*/]", name)[0]))
     by_key = {(cell.policy, cell.method): cell for cell in some}
     rows = [f"| {policy} | " + " | ".join(written(cells, by_key.get((policy, method))) for method in methods) + " |"
             for policy in policies]  # fmt: skip
@@ -80,7 +88,11 @@ def figure(cells: list[Cell], path: Path) -> None:
     for row, method in zip(axes, methods, strict=True):
         for panel, log in zip(row, logs, strict=True):
             for name, label in KINDS.items():
-                line = [cell for cell in group(some, log=log, method=method) if kind(cell) == name and cell.cost <= 0.5]
+                line = [
+                    cell
+                    for cell in group(some, log=log, method=method)
+                    if kind(cell) == name and label and cell.cost <= 0.5
+                ]
                 if line:
                     panel.plot([100 * c.cost for c in line], [100 * c.miou for c in line], ".-", lw=1, label=label)
             panel.set_title(f"{log.removeprefix('keys-')}, {method}", fontsize=8)

@@ -31,6 +31,7 @@ from stsem.replay.build import Model, build_model, policy_of, registering
 from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTimes
 from stsem.stages import register
+from stsem.stages.budget import BURST, BudgetPolicy
 from stsem.stages.keyframe import Keyframe, view_of
 from stsem.stages.propagate import PROPAGATIONS
 from stsem.stages.propagation import flow
@@ -72,11 +73,21 @@ class Cell:
 def configured(policy: str, method: str, model: str) -> RunConfig:
     """`paper*S`: the paper's rule with its default thresholds times S."""
     name, _, scale = policy.partition("*")
+    name = "paper" if trial(policy) else name
     plain, factor = RunConfig(), float(scale or 1)
     return RunConfig(
         mode="keyframe", model=model, keyframes=name, propagation=method, keyframe_time_s=TIME_S, clock="offline",
         keyframe_rotation=factor * plain.keyframe_rotation, keyframe_translation=factor * plain.keyframe_translation,
     )  # fmt: skip
+
+
+def trial(policy: str) -> BudgetPolicy | None:
+    """A budget by motion or coverage whatever the method: `moved:HZ`, `covered:HZ`; with the burst B `moved/B:HZ`."""
+    name, _, hz = policy.partition(":")
+    by, _, burst = name.partition("/")
+    if by not in ("moved", "covered"):
+        return None
+    return BudgetPolicy(float(hz), by_coverage=by == "covered", burst=int(burst or BURST))
 
 
 class Partial:
@@ -121,7 +132,7 @@ def replayed(frames: list[Loaded], model: Model, cell: tuple[str, str, float]) -
     method_name, policy_name, share = cell
     classes = len(model.classes)
     config = configured(policy_name, method_name, "oracle" if model.network is None else "default")
-    policy, method = policy_of(config), PROPAGATIONS[method_name].make(model.classes, 0)
+    policy, method = trial(policy_name) or policy_of(config), PROPAGATIONS[method_name].make(model.classes, 0)
     segmenter = model.segmenter(1, StageTimes())
     rule = AnswerRule(segmenter, Prediction(policy, method, registering(policy, method, 0)))
     partial = Partial(share, method, segmenter.segment)

@@ -113,13 +113,17 @@ def registering(policy: KeyframePolicy, method: Propagation, seed: int) -> Regis
 
 
 def policy_of(config: RunConfig) -> KeyframePolicy:
-    """The keyframe policy with its numbers, for one run."""
+    """The keyframe policy with its numbers, for one run.
+
+    What a method loses is what it does not cover only where it knows the pixels in space: a chain of flows that never
+    left the image, or the outline of a homography, says little about what is right (docs/keyframes.md).
+    """
     return parse_policy(
         config.keyframes,
         rotation=config.keyframe_rotation,
         translation=config.keyframe_translation,
         time_ns=round(config.keyframe_time_s * 1e9),
-        covers=PROPAGATIONS[config.propagation].covers,
+        covers=PROPAGATIONS[config.propagation].needs.space,
     )
 
 

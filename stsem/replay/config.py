@@ -149,11 +149,11 @@ class RunConfig(BaseModel):
 
     def _check_coverage(self) -> None:
         """Raise ValueError where a policy asks for coverage that nobody could tell."""
-        covers = PROPAGATIONS[self.propagation].covers
-        policy = parse_policy(self.keyframes, rotation=1.0, translation=1.0, time_ns=1, covers=covers)
+        method = PROPAGATIONS[self.propagation]
+        policy = parse_policy(self.keyframes, rotation=1.0, translation=1.0, time_ns=1, covers=method.needs.space)
         if not policy.needs_coverage or all(mode.segments_every_frame for mode in self.modes):
             return
-        if not covers:
+        if not method.covers:
             raise ValueError(
                 f"--keyframes {self.keyframes} asks how much a prediction covers, which --propagation "
                 f"{self.propagation} cannot tell; choose another propagation, or --keyframes paper, every:N, budget:HZ"

@@ -19,7 +19,7 @@ class BudgetPolicy:
 
     Args:
         hz: keyframes a second, above 0.
-        by_coverage: whether the loss is what the method does not cover; else it is how far the image moved.
+        by_coverage: whether the loss is what keyframes do not cover; else it is how far the image moved.
         burst: at least 2.
     """
 
@@ -31,12 +31,12 @@ class BudgetPolicy:
 
     @property
     def needs_homography(self) -> bool:
-        """Where the method cannot tell its coverage."""
+        """Where the loss is motion."""
         return not self._by_coverage
 
     @property
     def needs_coverage(self) -> bool:
-        """Where the method can tell it."""
+        """Where the loss is what is not covered."""
         return self._by_coverage
 
     def reason(self, candidate: Candidate) -> str | None:

@@ -89,7 +89,7 @@ class Numbers:
 
     Args:
         rotation, translation, time_ns: see `PaperPolicy`; the longest time is that of `coverage`, too.
-        covers: whether the method of prediction can tell what it covers.
+        covers: whether what the method of prediction does not cover is what it loses.
     """
 
     rotation: float

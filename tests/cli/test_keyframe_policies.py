@@ -54,7 +54,8 @@ def test_what_nobody_can_tell(replay: Cli, home: Path, made_up_costs: Path) -> N
             f"--keyframes {policy} asks how much a prediction covers, which --propagation hold cannot" in ran.sentence
         )
     for policy in ("coverage", "budget:2"):
-        ran = replay(TINY, *COMMON, "--costs", made_up_costs, "--keyframes", policy, "--sustainable")
+        depth = ("--propagation", "depth", "--keyframes", policy)
+        ran = replay(TINY, *COMMON, "--costs", made_up_costs, *depth, "--sustainable")
         assert ran.code == 2
         assert "--sustainable decides keyframes without images" in ran.sentence
     per_frame = ("--model", "oracle", "--mode", "per-frame", "--clock", "offline", "--no-plots", "--out", "r")
