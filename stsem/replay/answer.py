@@ -48,8 +48,8 @@ class AnswerRule:
     """The steps of one mode over one log, with the keyframes it remembers.
 
     Frames are predicted from `source`, the finished keyframe with the newest stamp. Between a keyframe's choice and its
-    labels any number of frames may be answered; each is registered to the last *selected* keyframe, for the policy, and
-    to the source.
+    labels any number of frames may be answered; each is registered to the last *selected* keyframe if the policy looks
+    at that, and to the source if the method does.
 
     Args:
         segmenter: labels keyframes.
@@ -79,7 +79,7 @@ class AnswerRule:
         """What relates `frame` to the last selected keyframe and to the source."""
         if self._prediction is None or self._prediction.register is None:
             return None
-        return self._prediction.register(frame, self._anchors())
+        return self._prediction.register(frame, self._anchors(self._prediction))
 
     def choose(self, frame: Frame, registration: Registration | None) -> str | None:
         """Why `frame` is a keyframe, or None; a chosen frame is remembered as the last selected one.
@@ -135,14 +135,16 @@ class AnswerRule:
     def _method(self) -> Propagation | None:
         return None if self._prediction is None else self._prediction.method
 
-    def _anchors(self) -> tuple[Anchor, ...]:
-        """The last selected keyframe and the source, each once, where their points are known."""
-        selected = None if self._selected is None else self._selected.anchor
+    def _anchors(self, rule: Prediction) -> tuple[Anchor, ...]:
+        """The last selected keyframe if the policy looks at it, the source if the method does, each once."""
+        found: dict[int, Anchor] = {}
+        looks = rule.policy.needs_homography or rule.policy.needs_coverage
+        if looks and self._selected is not None and (anchor := self._selected.anchor):
+            found[anchor.index] = anchor
         source = self._source
-        if source is None or source.features is None or (selected is not None and selected.index == source.index):
-            return () if selected is None else (selected,)
-        other = Anchor(source.index, source.features)
-        return (other,) if selected is None else (selected, other)
+        if rule.method.needs.points and source is not None and source.features is not None:
+            found.setdefault(source.index, Anchor(source.index, source.features))
+        return tuple(found.values())
 
     def _reason(self, policy: KeyframePolicy, frame: Frame, registration: Registration | None) -> str | None:
         if self._selected is None:

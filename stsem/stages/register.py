@@ -1,7 +1,7 @@
 """Register: what relates this frame to those before it: points, homographies (equation 2), and what a method follows.
 
-A frame is registered to the last selected keyframe, from which the policy tells how far the image moved, and to the one
-that its labels would come from, where that is another.
+A frame is registered to the last selected keyframe if the policy tells from it how far the image moved, and to the one
+that its labels would come from if the method warps them.
 """
 
 from collections.abc import Mapping, Sequence

@@ -75,11 +75,13 @@ def test_age(replay: Cli, home: Path, slow: Path, tiny_log: Path) -> None:
     assert f"{beside['replaced']} lost their place before the network to a newer choice" in text
 
 
-@pytest.mark.parametrize(("flags", "said"), [((), True), (("--propagation", "hold", "--keyframes", "every:2"), False)])
+@pytest.mark.parametrize(
+    ("flags", "said"), [((), True), (("--propagation", "flow"), False), (("--keyframes", "every:2"), False)]
+)
 def test_what_the_profile_does_not_know(
     replay: Cli, home: Path, tiny_log: Path, flags: tuple[str, ...], said: bool
 ) -> None:
-    """Points are matched with two keyframes, which no profile was measured with; not where nobody looks at points."""
+    """Policy and method match points, each with a keyframe of its own; no profile was measured with two."""
     base = ("--model", "oracle", "--mode", "keyframe-async", "--no-offline", *flags)
     assert replay(tiny_log, *base, "--out", "r").code == 0
     assert any("registers a frame to two keyframes" in text for text in report("r")["warnings"]) == said
