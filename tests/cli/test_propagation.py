@@ -68,7 +68,7 @@ def test_depth_where_a_frame_has_none(replay: Cli, home: Path, tmp_path: Path) -
     assert replay(log, *OFFLINE, "--propagation", "depth", "--out", "r").code == 0
     (run,) = report("r")["runs"]
     assert run["remarks"] == {"no depth or pose: by flow": 3}
-    assert [row["frame"] for row in rows("r") if row["reason"].startswith("no depth")] == ["2", "3", "8"]
+    assert [row["frame"] for row in rows("r") if row["remark"].startswith("no depth")] == ["2", "3", "8"]
     assert run["outcomes"]["incomplete"] == 0
 
 
