@@ -18,7 +18,7 @@ from stsem.slam.rotations import F64, logarithm
 from stsem.slam.verify import Match, View, verify
 
 MIN_KEYFRAMES_BETWEEN = 12
-MAX_CANDIDATES = 2
+MAX_CANDIDATES = 3
 REST = 3
 """Keyframes after a closed loop in which none is sought: odometry drifts little in them."""
 DRIFT_PER_METRE = 0.06

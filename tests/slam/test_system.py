@@ -8,10 +8,12 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from stsem.camera import Camera
 from stsem.frame import Frame
 from stsem.pose import Pose, inverse
+from stsem.slam import loops
 from stsem.slam.system import Slam
 from stsem.slam.tracker import Status, Tracked
 from tests.slam.made_up_room import CAMERA, dark, frame, pose
 
+ROUND = [pose(0.3 * np.sin(np.radians(10 * i)), 0.0, 0.3 * np.cos(np.radians(10 * i)), 10 * i, 25) for i in range(38)]
 TURN = [pose(0.3 * np.sin(np.radians(12 * i)), 0.0, 0.2 * np.cos(np.radians(12 * i)), 12 * i) for i in range(12)]
 
 
@@ -28,7 +30,7 @@ def _off(slam: Slam, truth: list[Pose]) -> float:
 
 
 def test_a_turn_is_followed_and_its_frames_hang_on_keyframes() -> None:
-    slam, answers = _run([frame(i, T, 0.003) for i, T in enumerate(TURN[:8])])
+    slam, answers = _run([frame(i, T, 0.001) for i, T in enumerate(TURN[:8])])
     assert slam.lost == 0
     assert _off(slam, TURN) < 0.02
     poses = slam.keyframe_poses()
@@ -37,6 +39,24 @@ def test_a_turn_is_followed_and_its_frames_hang_on_keyframes() -> None:
         assert anchor is not None
         np.testing.assert_allclose(poses[anchor[0]] @ anchor[1], one.T_WC, atol=1e-12)
     assert answers[-1].T_WC is not None
+
+
+def test_a_loop_is_closed_and_sets_right_what_was_drawn_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once around: the loop brings the end back to the start, and moves the frames before it too."""
+    frames = [frame(i, T, 0.001) for i, T in enumerate(ROUND)]
+    closed, answers = _run(frames)
+    monkeypatch.setattr(loops, "MIN_KEYFRAMES_BETWEEN", len(frames))
+    opened, unaided = _run(frames)
+    assert (closed.closed, opened.closed, closed.lost) == (1, 0, 0)
+    assert _error(answers[-1].T_WC, 37) < 0.01 < _error(unaided[-1].T_WC, 37)
+    before = [one for one in closed.trajectory() if 20 <= one.index < 33]
+    for one, live in zip(before, answers[20:33], strict=True):
+        assert _error(one.T_WC, one.index) < _error(live.T_WC, one.index)
+
+
+def _error(T_WC: Pose | None, index: int) -> float:
+    assert T_WC is not None
+    return float(np.linalg.norm((inverse(inverse(ROUND[0]) @ ROUND[index]) @ T_WC)[:3, 3]))
 
 
 def test_black_frames_are_lost_and_left_out_and_the_place_is_found_again() -> None:
