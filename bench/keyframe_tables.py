@@ -87,14 +87,17 @@ def figure(cells: list[Cell], path: Path) -> None:
     drawn, axes = plt.subplots(len(methods), len(logs), figsize=(3 * len(logs), 2.1 * len(methods)), squeeze=False)
     for row, method in zip(axes, methods, strict=True):
         for panel, log in zip(row, logs, strict=True):
-            for name, label in KINDS.items():
+            panel.set_visible(bool(group(some, log=log, method=method)))
+            for place, (name, label) in enumerate(KINDS.items()):
                 line = [
                     cell
                     for cell in group(some, log=log, method=method)
                     if kind(cell) == name and label and cell.cost <= 0.5
                 ]
                 if line:
-                    panel.plot([100 * c.cost for c in line], [100 * c.miou for c in line], ".-", lw=1, label=label)
+                    panel.plot(
+                        [100 * c.cost for c in line], [100 * c.miou for c in line], f"C{place}.-", lw=1, label=label
+                    )
             panel.set_title(f"{log.removeprefix('keys-')}, {method}", fontsize=8)
             panel.tick_params(labelsize=7)
     axes[0, 0].legend(fontsize=7)
