@@ -78,9 +78,9 @@ def carry(
         if confidence is not None and source.confidence is not None:
             pairs.fetch(source.confidence, confidence)
     holes = labels == NO_LABEL
-    np.copyto(labels, rest.labels, where=holes)
+    cv2.copyTo(rest.labels, holes.view(np.uint8), labels)
     if confidence is not None and rest.confidence is not None:
-        np.copyto(confidence, rest.confidence, where=holes)
+        cv2.copyTo(rest.confidence, holes.view(np.uint8), confidence)
     return Carried(labels, confidence, ~holes | (rest.covered & _looked_up(moving, rest.labels)))
 
 
@@ -102,7 +102,7 @@ def _asked(
         if rows is None:
             rows = np.flatnonzero((labels == NO_LABEL) & (current.depth > 0))
         sample = rows[:: max(1, len(rows) // SAMPLES)]
-        hits = np.count_nonzero(among(current, source.view, sample, agreement=agreement, beside=False).found)
+        hits = np.count_nonzero(among(current, source.view, sample, agreement=agreement).found)
         if hits * len(rows) > MIN_GAIN * labels.size * len(sample):
-            yield source, among(current, source.view, rows, agreement=agreement, beside=False)
+            yield source, among(current, source.view, rows, agreement=agreement)
             asked, rows = asked + 1, None

@@ -24,7 +24,23 @@ Field = npt.NDArray[np.float32]
 
 WORKING_SIDE = 480
 """Longer side, in pixels, of the images between which flow is sought (docs/propagation.md has what others cost)."""
-PRESET = cv2.DISOPTICAL_FLOW_PRESET_FAST
+
+
+@dataclass(frozen=True)
+class Search:
+    """Settings of OpenCV's dense inverse search.
+
+    Args:
+        preset: one of cv2.DISOPTICAL_FLOW_PRESET_*.
+        finest: the level of the pyramid that it ends at, 0 being the image itself; None as the preset has it. It decides
+            more than the preset does (docs/propagation.md).
+    """
+
+    preset: int = cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST
+    finest: int | None = 1
+
+
+SEARCH = Search()
 MIN_SIDE = 16
 """A smaller image has no room for a pyramid of patches; nothing is said to move there."""
 
@@ -39,16 +55,16 @@ def working_grey(image: Image, *, side: int = WORKING_SIDE) -> Grey:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
 
 
-def backward_flow(current: Grey, previous: Grey, *, preset: int = PRESET) -> Field:
+def backward_flow(current: Grey, previous: Grey, *, search: Search = SEARCH) -> Field:
     """Where each pixel of `current` was in `previous`, as an offset, by dense inverse search (Kroeger et al. 2016).
 
     Args:
         current, previous: (h, w) of one size; below MIN_SIDE the flow is zero.
-        preset: of OpenCV; the medium one is better and takes four times as long.
+        search: how it is sought.
     """
     if min(current.shape) < MIN_SIDE:
         return np.zeros((*current.shape, 2), np.float32)
-    return np.asarray(_dense_inverse_search(preset).calc(current, previous, None), np.float32)  # type: ignore[call-overload]
+    return np.asarray(_dense_inverse_search(search).calc(current, previous, None), np.float32)  # type: ignore[call-overload]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +128,11 @@ def _fetched(values: npt.NDArray[Value], places: Field) -> npt.NDArray[Value]:
 
 
 @lru_cache(maxsize=3)
-def _dense_inverse_search(preset: int) -> cv2.DISOpticalFlow:
-    return cv2.DISOpticalFlow.create(preset)
+def _dense_inverse_search(search: Search) -> cv2.DISOpticalFlow:
+    found = cv2.DISOpticalFlow.create(search.preset)
+    if search.finest is not None:
+        found.setFinestScale(search.finest)
+    return found
 
 
 @lru_cache(maxsize=4)

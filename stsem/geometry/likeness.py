@@ -35,6 +35,8 @@ LIGHTNESS = 0.5
 """Weight of L* against a* and b*: shade tells less than colour."""
 VOTERS = 5
 SOFT = 0.1
+SLACK = 0.5
+"""A voter may be up to this share farther away than the true one: 0.2 % of the votes change, in a third of the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +96,20 @@ class Likeness:
     """Examples of any number of keyframes, to be asked for the nearest. The first question builds the search tree.
 
     Up is the mean over the keyframes, since no log says where it is and cameras are seldom upside down.
+
+    Args:
+        examples: of the keyframes.
+        slack: how much farther away than the true voters those found may be, as a share; 0 for an exact search.
     """
 
     examples: tuple[Examples, ...]
+    slack: float = SLACK
 
     def classify(self, features: Features) -> tuple[Labels, npt.NDArray[np.float32]]:
         """Label (n,) and share of the votes (n,) 0..1 for `features` (n, 9); there must be at least one example."""
         labels = self._labels
-        found = self._tree.query(self._with_height(features), k=np.arange(1, 1 + min(VOTERS, len(labels))))
+        voters = np.arange(1, 1 + min(VOTERS, len(labels)))
+        found = self._tree.query(self._with_height(features), k=voters, eps=self.slack)
         distances, nearest = np.asarray(found[0], np.float64), np.asarray(found[1], np.intp)
         weights, voted = 1 / (distances + SOFT), labels[nearest]
         votes = np.zeros((len(features), int(labels.max()) + 1))
@@ -118,7 +126,7 @@ class Likeness:
     @cached_property
     def _tree(self) -> cKDTree:
         features = np.concatenate([some.features for some in self.examples])
-        return cKDTree(self._with_height(features), balanced_tree=False, compact_nodes=False)
+        return cKDTree(self._with_height(features), balanced_tree=False)
 
     def _with_height(self, features: Features) -> Features:
         """(n, 10)."""
@@ -154,8 +162,7 @@ def described(view: View, image: Image) -> Cells:
     lab = cv2.cvtColor(colour, cv2.COLOR_RGB2LAB).astype(np.float32) / np.float32(COLOUR)
     lab[..., 0] *= np.float32(LIGHTNESS)
     features = np.concatenate([place / np.float32(PLACE_M), _normals(place) / np.float32(NORMAL), lab], axis=2)
-    known = np.asarray(np.isfinite(place).all(axis=2), np.bool_)
-    return Cells(features, -view.T_WC[:3, 1], known, side)
+    return Cells(features, -view.T_WC[:3, 1], np.asarray(depth > 0, np.bool_), side)
 
 
 def completed(answer: Carried, cells: Cells, likeness: Likeness) -> Carried:
@@ -203,7 +210,8 @@ def _normals(place: Features) -> Features:
         return np.zeros_like(place)
     down, right = np.gradient(place, axis=0), np.gradient(place, axis=1)
     (a, b, c), (d, e, f) = np.moveaxis(down, 2, 0), np.moveaxis(right, 2, 0)
-    normal = np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=2)
-    length = np.sqrt((normal * normal).sum(axis=2, keepdims=True))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.nan_to_num(normal / length, nan=0.0, posinf=0.0, neginf=0.0), np.float32)
+    x, y, z = b * f - c * e, c * d - a * f, a * e - b * d
+    length = np.sqrt(x * x + y * y + z * z)
+    known = length > 0
+    length[~known] = 1
+    return np.asarray(np.stack([np.where(known, axis / length, np.float32(0)) for axis in (x, y, z)], axis=2), np.float32)

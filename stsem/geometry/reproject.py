@@ -29,6 +29,7 @@ PACKED_WIDTH = 256
 STRIP_PIXELS = 1 << 15
 NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """(column, row) steps to the pixels beside one, in the order in which they are tried."""
+SQUARE = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,58 +94,63 @@ class Correspondence:
             return
         fetched = np.asarray(cv2.remap(values, self.partners, None, cv2.INTER_NEAREST), values.dtype)  # type: ignore[call-overload]
         if self.rows is None:
-            np.copyto(onto, fetched, where=self.found)
+            cv2.copyTo(fetched, self.found.view(np.uint8), onto)
         else:
             onto.reshape(-1)[self.rows[self.found.reshape(-1)]] = fetched[self.found]
 
 
-def correspond(
-    current: View,
-    keyframe: View,
-    *,
-    where: Bools | None = None,
-    agreement: Agreement = DEFAULT_AGREEMENT,
-    beside: bool = True,
-) -> Correspondence:
+def correspond(current: View, keyframe: View, *, agreement: Agreement = DEFAULT_AGREEMENT) -> Correspondence:
     """The pixels of `current` that `keyframe` saw too.
 
-    A pixel without depth in either frame has no partner.
+    A pixel without depth in either frame has no partner. Where the depth of the nearest keyframe pixel disagrees, the
+    first pixel beside it that agrees is taken: at an edge, rounding may fall on the wrong side.
 
     Args:
         current, keyframe: the two frames; their sizes may differ.
-        where: (H, W) the pixels asked for; None for all.
         agreement: the test against occlusion.
-        beside: where the depth of the nearest keyframe pixel disagrees, take the first pixel beside it that agrees: at
-            an edge, rounding may fall on the wrong side.
     """
-    if where is not None:
-        return among(current, keyframe, np.flatnonzero(where & (current.depth > 0)), agreement=agreement, beside=beside)
     height, width = current.depth.shape
     x, y = np.arange(width, dtype=np.float32)[None, :], np.arange(height, dtype=np.float32)[:, None]
-    return Correspondence(*_partners((x, y, current.depth), current, keyframe, agreement, beside), rows=None)
+    partners, found = _partners((x, y, current.depth), current, keyframe, agreement)
+    beside = np.asarray(cv2.dilate(found.view(np.uint8), SQUARE), np.uint8).view(np.bool_) & (current.depth > 0)
+    _search_beside(np.flatnonzero(beside > found), current, keyframe, agreement, partners, found)
+    return Correspondence(partners, found, rows=None)
 
 
 def among(
-    current: View, keyframe: View, rows: Rows, *, agreement: Agreement = DEFAULT_AGREEMENT, beside: bool = True
+    current: View, keyframe: View, rows: Rows, *, agreement: Agreement = DEFAULT_AGREEMENT
 ) -> Correspondence:
-    """`correspond` for the pixels `rows` (n,) of the current frame, counted row by row."""
+    """`correspond` for the pixels `rows` (n,) of the current frame, counted row by row; none beside is tried."""
     if not len(rows):
         return Correspondence(np.empty((0, 1, 2), np.int16), np.empty((0, 1), np.bool_), rows)
+    packed = _packed(rows)
+    pixels = _pixels(current, packed)
+    return Correspondence(*_partners(pixels, current, keyframe, agreement), rows=packed.reshape(-1))
+
+
+def _packed(rows: Rows) -> Rows:
+    """(h, w) of `rows` (n,), the last one repeated at the end."""
     width = min(PACKED_WIDTH, len(rows))
-    packed = np.pad(rows, (0, -len(rows) % width), mode="edge").reshape(-1, width)
-    y, x = np.divmod(packed.astype(np.int32), np.int32(current.camera.width))
-    pixels = x.astype(np.float32), y.astype(np.float32), current.depth.reshape(-1).take(packed)
-    return Correspondence(*_partners(pixels, current, keyframe, agreement, beside), rows=packed.reshape(-1))
+    return np.pad(rows, (0, -len(rows) % width), mode="edge").reshape(-1, width)
 
 
-def _partners(
-    pixels: Pixels, current: View, keyframe: View, agreement: Agreement, beside: bool
-) -> tuple[Places, Bools]:
-    """(partners, found) of `Correspondence` for some pixels of `current`."""
+def _pixels(view: View, packed: Rows) -> Pixels:
+    """Column, row and depth, (h, w) each, of the pixels `packed` (h, w)."""
+    y, x = np.divmod(packed.astype(np.int32), np.int32(view.camera.width))
+    return x.astype(np.float32), y.astype(np.float32), view.depth.reshape(-1).take(packed)
+
+
+def _matrix(current: View, keyframe: View) -> Float32:
+    """(3, 4): z_k (u_k, v_k, 1) = z (its first three columns) (u, v, 1) + its last one."""
     T, K = inverse(keyframe.T_WC) @ current.T_WC, keyframe.camera.K
     moved = np.empty((3, 4), np.float32)
     moved[:, :3], moved[:, 3] = K @ T[:3, :3] @ np.linalg.inv(current.camera.K), K @ T[:3, 3]
-    x, y, depth = pixels
+    return moved
+
+
+def _partners(pixels: Pixels, current: View, keyframe: View, agreement: Agreement) -> tuple[Places, Bools]:
+    """(partners, found) of `Correspondence` for some pixels of `current`."""
+    (x, y, depth), moved = pixels, _matrix(current, keyframe)
     height, width = depth.shape
     partners, found = np.empty((height, width, 2), np.int16), np.empty((height, width), np.bool_)
     # Strip by strip, so that what is computed in between stays in the processor's cache.
@@ -152,22 +158,25 @@ def _partners(
     for top in range(0, height, lines):
         strip = slice(top, top + lines)
         some = x if len(x) == 1 else x[strip], y[strip], depth[strip]
-        _partners_of_strip(some, moved, keyframe.depth, agreement, beside, partners[strip], found[strip])
+        _partners_of_strip(some, moved, keyframe.depth, agreement, partners[strip], found[strip])
     return partners, found
 
 
 def _partners_of_strip(
-    pixels: Pixels, moved: Float32, depth: Depth, agreement: Agreement, beside: bool, partners: Places, found: Bools
+    pixels: Pixels, moved: Float32, depth: Depth, agreement: Agreement, partners: Places, found: Bools
 ) -> None:
     """Write `partners` and `found` for a few lines of pixels."""
     u, v, z = _projected(pixels, moved)
     cv2.convertMaps(u, v, cv2.CV_16SC2, partners, nninterpolation=True)
+    found[:] = _agrees(depth, partners, z, _limit(z, agreement))
+
+
+def _limit(z: Float32, agreement: Agreement) -> Float32:
+    """How far another depth may be from z, metres."""
     limit = z * np.float32(agreement.per_m)
     limit += np.float32(agreement.share)
     limit *= z
-    found[:] = _agrees(depth, partners, z, limit)
-    if beside:
-        _search_beside(depth, partners, found, z, limit)
+    return limit
 
 
 def _projected(pixels: Pixels, moved: Float32) -> tuple[Float32, Float32, Float32]:
@@ -196,19 +205,26 @@ def _agrees(depth: Depth, partners: Places, z: Float32, limit: Float32) -> Bools
     return np.asarray(there <= limit)
 
 
-def _search_beside(depth: Depth, partners: Places, found: Bools, z: Float32, limit: Float32) -> None:
-    """For pixels with depth that found no partner, write the first of its neighbours that agrees, if one does."""
-    height, width = depth.shape
-    flat_partners, flat_found, flat_depth = partners.reshape(-1, 2), found.reshape(-1), depth.reshape(-1)
-    left = np.flatnonzero(~flat_found & (z.reshape(-1) > 0))
-    x, y = flat_partners[left].astype(np.int32).T
-    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    left, x, y = left[inside], x[inside], y[inside]
-    z, limit = z.reshape(-1)[left], limit.reshape(-1)[left]
-    for right, down in NEIGHBOURS:
-        beside_x, beside_y = np.clip(x + right, 0, width - 1), np.clip(y + down, 0, height - 1)
-        agrees = np.abs(flat_depth.take(beside_y * width + beside_x) - z) <= limit
-        hit, rest = left[agrees], ~agrees
-        flat_partners[hit, 0], flat_partners[hit, 1] = beside_x[agrees], beside_y[agrees]
-        flat_found[hit] = True
-        left, x, y, z, limit = left[rest], x[rest], y[rest], z[rest], limit[rest]
+def _search_beside(
+    rows: Rows, current: View, keyframe: View, agreement: Agreement, partners: Places, found: Bools
+) -> None:
+    """For the pixels `rows` of `current`, write the first of their partner's neighbours that agrees, if one does.
+
+    They have no partner yet and lie beside pixels that have: an edge is thin, and far inside of what the keyframe did
+    not see, nothing is sought.
+    """
+    if not len(rows):
+        return
+    packed, pairs = _packed(rows), partners.view(np.int32).reshape(-1)
+    _, _, z = _projected(_pixels(current, packed), _matrix(current, keyframe))
+    limit, here = _limit(z, agreement), pairs[packed].view(np.int16).reshape(*packed.shape, 2)
+    best, agreed = here.copy(), np.zeros(packed.shape, np.bool_)
+    for step in NEIGHBOURS[::-1]:
+        there = here + np.array(step, np.int16)
+        agrees = _agrees(keyframe.depth, there, z, limit)
+        cv2.copyTo(there, agrees.view(np.uint8), best)
+        agreed |= agrees
+    height, width = keyframe.depth.shape
+    agreed &= cv2.inRange(here, (0, 0), (width - 1, height - 1)) > 0
+    hits = packed[agreed]
+    pairs[hits], found.reshape(-1)[hits] = best.view(np.int32)[..., 0][agreed], True

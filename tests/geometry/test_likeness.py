@@ -94,7 +94,7 @@ def test_the_vote_is_that_of_the_nearest_weighted_by_distance() -> None:
     asked = rng.normal(size=(40, 9)).astype(np.float32)
     up = np.array([0.0, -0.8, 0.6])
     halves = [Examples(features[:90], labels[:90], up), Examples(features[90:], labels[90:], up)]
-    found, shares = remembered(halves).classify(asked)
+    found, shares = Likeness(tuple(halves), slack=0).classify(asked)
     apart = asked[:, None].astype(np.float64) - features
     height = apart[..., :3] @ up * PLACE_M / HEIGHT_M
     distances = np.sqrt((apart**2).sum(axis=2) + height**2)

@@ -81,7 +81,7 @@ def test_some_pixels_get_what_all_would() -> None:
     whole = fetched(current, keyframe)
     wanted = generator(1, "wanted").random((64, 96)) < 0.3
     some = np.full_like(whole, NO_LABEL)
-    correspond(current, keyframe, where=wanted).fetch(LABELS, some)
+    among(current, keyframe, np.flatnonzero(wanted)).fetch(LABELS, some)
     np.testing.assert_array_equal(some, np.where(wanted, whole, NO_LABEL))
     among(current, keyframe, np.empty(0, np.intp)).fetch(LABELS, some)
     np.testing.assert_array_equal(some, np.where(wanted, whole, NO_LABEL))

@@ -19,6 +19,8 @@ KEPT = 32
 """Keyframes remembered: up to 9 bytes a pixel each, 152 MB in all at 960x540 with what they look like."""
 SAMPLES = 2048
 """Pixels by which the coverage of a frame is foretold."""
+FLOW_SIDE = 320
+"""Longer side, in pixels, of the images between which flow is sought: most pixels come by depth."""
 NO_SPACE = "no depth or pose: by flow"
 
 
@@ -46,7 +48,7 @@ class DepthWarp:
 
     def __init__(self, classes: ClassSet) -> None:
         self._moving = moving_classes(classes)
-        self._flow = Flow()
+        self._flow = Flow(side=FLOW_SIDE)
         self._memory: tuple[_Memory, ...] = ()
         self._likeness = remembered(())
         self._selected: View | None = None
@@ -83,8 +85,12 @@ class DepthWarp:
         covered = np.zeros(answer.labels.shape, np.bool_) if answer.covered is None else answer.covered
         rest = Carried(answer.labels, answer.confidence, covered)
         seen = carry(view, [memory.source for memory in self._memory], rest, moving=self._moving)
-        found = completed(seen, described(view, frame.image), self._likeness)
+        found = self._completed(seen, view, frame)
         return Predicted(Segmentation(found.labels, found.confidence, covered=found.covered), source.index)
+
+    def _completed(self, seen: Carried, view: View, frame: Frame) -> Carried:
+        """`seen` with guesses by likeness for what is not covered."""
+        return completed(seen, described(view, frame.image), self._likeness)
 
     def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
         """The share of some pixels with depth that any keyframe saw, persons or not; by flow for a frame without depth.
@@ -104,7 +110,7 @@ class DepthWarp:
         for keyframe in (*selected, *(memory.source.view for memory in self._memory)):
             if not len(left):
                 break
-            pairs = among(view, keyframe, left, beside=False)
+            pairs = among(view, keyframe, left)
             left = left[~pairs.found.reshape(-1)[: len(left)]]
         return len(rows) - len(left)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from stsem.frame import Frame, Segmentation
-from stsem.geometry.flow import PRESET, Chain, Grey, backward_flow, working_grey
+from stsem.geometry.flow import SEARCH, WORKING_SIDE, Chain, Grey, Search, backward_flow, working_grey
 from stsem.stages.keyframe import Keyframe
 from stsem.stages.propagation.hold import uncovered
 from stsem.stages.propagation.method import Needs, Predicted
@@ -16,24 +16,25 @@ class Flow:
     """Follows every keyframe that frames may yet be predicted from; what came into the image gets the border's label.
 
     Args:
-        preset: of OpenCV's dense inverse search.
+        search: how flow is sought.
+        side: longer side, in pixels, of the images between which it is sought.
     """
 
     needs = Needs(follows=True)
 
-    def __init__(self, preset: int = PRESET) -> None:
-        self._preset = preset
+    def __init__(self, search: Search = SEARCH, side: int = WORKING_SIDE) -> None:
+        self._search, self._side = search, side
         self._last: Grey | None = None
         self._chains: dict[int, Chain] = {}
         self._newest: int | None = None
 
     def see(self, frame: Frame, registration: Registration) -> None:
         """One link more in every chain; an image of another size breaks them."""
-        grey = working_grey(frame.image)
+        grey = working_grey(frame.image, side=self._side)
         if self._last is None or self._last.shape != grey.shape:
             self._chains = {}
         if self._last is not None and self._chains:
-            flow = backward_flow(grey, self._last, preset=self._preset)
+            flow = backward_flow(grey, self._last, search=self._search)
             self._chains = {index: chain.extended(flow) for index, chain in self._chains.items()}
         self._last = grey
 
