@@ -21,7 +21,7 @@ import numpy as np
 from stsem.classes import NO_LABEL, Labels
 from stsem.frame import Frame, Image, Segmentation
 from stsem.geometry.features import Features, extract
-from stsem.geometry.flow import Field, Grey, backward_flow
+from stsem.geometry.flow import Field, Grey, Search, backward_flow
 from stsem.inference.threads import set_threads
 from stsem.log.log import Loaded, open_log
 from stsem.metrics.confusion import confusion
@@ -169,10 +169,10 @@ def remember_what_no_keyframe_changes() -> None:
         key = image.tobytes()[::97]
         return points.get(key) or points.setdefault(key, extract(image))
 
-    def remembered(current: Grey, previous: Grey, *, preset: int) -> Field:
+    def remembered(current: Grey, previous: Grey, *, search: Search) -> Field:
         key = current.tobytes()[::31], previous.tobytes()[::31]
         if key not in flows:
-            flows[key] = backward_flow(current, previous, preset=preset)
+            flows[key] = backward_flow(current, previous, search=search)
         return flows[key]
 
     register.extract, flow.backward_flow = features, remembered  # type: ignore[assignment]
