@@ -55,7 +55,7 @@ def replay(
             "--propagation",
             panel=_PIPELINE,
             metavar="METHOD",
-            help="hold, homography, homography-chained, flow or depth. [homography]",
+            help="auto, hold, homography, homography-chained, flow, depth. [auto]",
         ),
     ] = None,
     pose: Annotated[

@@ -22,7 +22,7 @@ from stsem.log.container.source import shown_name, without_secrets
 from stsem.log.describe import log_name
 from stsem.log.log import Log, open_log
 from stsem.plain import MAX_SENTENCE, plain
-from stsem.replay.build import Model, build_model, needed_roles, truth_frames
+from stsem.replay.build import Model, build_model, needed_roles, settled, truth_frames
 from stsem.replay.config import RunConfig
 from stsem.replay.costing import Costing, costing
 from stsem.replay.documents import build_document
@@ -111,7 +111,7 @@ def _replay_one(paths: tuple[str, ...], config: RunConfig, out: Path | None) -> 
             start_s=config.start, end_s=config.end, progress=step,
         )  # fmt: skip
     with log:
-        session = _session(log, config)
+        session = _session(log, settled(log, config))
         document, folder = _write(session, out, began)
         for number in range(2, config.repeat + 1):
             _check_repeats(session, folder, number)

@@ -22,7 +22,7 @@ from stsem.replay.hosttimes import StageTimes, TimedInferencer, TimedPropagation
 from stsem.replay.memo import Memo
 from stsem.replay.modes import Mode
 from stsem.stages.candidate import KeyframePolicy
-from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.propagate import AUTO, IN_SPACE, IN_THE_IMAGE, PROPAGATIONS
 from stsem.stages.propagation.method import Propagation
 from stsem.stages.register import Register
 from stsem.stages.segment import NetworkSegmenter, OracleSegmenter, Segmenter
@@ -148,16 +148,28 @@ def _oracle(log: Log) -> Model:
     return Model("oracle", None, log.classes, None, "", lambda threads, times: Memo(segmenter))
 
 
-def _check_space(log: Log, config: RunConfig) -> None:
-    """Raise ChannelError where the propagation takes what no frame of the log has."""
-    if not _predicts_in_space(config):
-        return
+def settled(log: Log, config: RunConfig) -> RunConfig:
+    """`config` with the propagation that `auto` means for this log."""
+    if config.propagation != AUTO:
+        return config
+    return config.model_copy(update={"propagation": IN_THE_IMAGE if _lacking(log, config) else IN_SPACE})
+
+
+def _lacking(log: Log, config: RunConfig) -> str | None:
+    """The first thing that a propagation in space takes and no frame of the log has."""
     choice, camera = log.info.choice, log.camera
     lacking = {
         "depth": choice.depth is None, "pose": choice.pose is None and config.pose == "log",
         "camera": camera is None or camera.is_distorted,
     }  # fmt: skip
-    if missing := next((role for role, absent in lacking.items() if absent), None):
+    return next((role for role, absent in lacking.items() if absent), None)
+
+
+def _check_space(log: Log, config: RunConfig) -> None:
+    """Raise ChannelError where the propagation takes what no frame of the log has."""
+    if not _predicts_in_space(config):
+        return
+    if missing := _lacking(log, config):
         what = "calibrated camera without distortion" if missing == "camera" else f"{missing} channel"
         hint = "" if missing == "camera" else f"name one with --topic {missing}=TOPIC, or "
         raise ChannelError(

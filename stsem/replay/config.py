@@ -9,7 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, f
 
 from stsem.replay.modes import Mode, parse_modes
 from stsem.replay.queues import parse_queue
-from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.propagate import AUTO, IN_SPACE, PROPAGATIONS
 from stsem.stages.select import parse_policy
 
 _SWITCHES = {"on": True, "yes": True, "true": True, "1": True, "off": False, "no": False, "false": False, "0": False}
@@ -63,7 +63,11 @@ class RunConfig(BaseModel):
     keyframe_time_s: float = Field(
         1.0, gt=0, le=LONGEST_S, description="paper, coverage: longest time between keyframes, seconds."
     )
-    propagation: str = Field("homography", description="How frames between keyframes are predicted.")
+    propagation: str = Field(
+        AUTO,
+        description="How frames between keyframes are predicted; 'auto': 'depth' where the log has what it takes, "
+        "else 'flow'.",
+    )
     pose: PoseSource = Field(
         "log", description="Where the camera's pose comes from: the log, or 'slam' on colour and depth."
     )
@@ -117,8 +121,8 @@ class RunConfig(BaseModel):
     @field_validator("propagation")
     @classmethod
     def _propagation_exists(cls, text: str) -> str:
-        if text not in PROPAGATIONS:
-            raise ValueError(f"there is no propagation {text!r}; there is {', '.join(PROPAGATIONS)}")
+        if text not in (AUTO, *PROPAGATIONS):
+            raise ValueError(f"there is no propagation {text!r}; there is {AUTO}, {', '.join(PROPAGATIONS)}")
         return text
 
     @field_validator("queue")
@@ -149,7 +153,7 @@ class RunConfig(BaseModel):
 
     def _check_coverage(self) -> None:
         """Raise ValueError where a policy asks for coverage that nobody could tell."""
-        method = PROPAGATIONS[self.propagation]
+        method = PROPAGATIONS[IN_SPACE if self.propagation == AUTO else self.propagation]
         policy = parse_policy(self.keyframes, rotation=1.0, translation=1.0, time_ns=1, covers=method.needs.space)
         if not policy.needs_coverage or all(mode.segments_every_frame for mode in self.modes):
             return

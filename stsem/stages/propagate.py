@@ -26,6 +26,9 @@ class Method:
     covers: bool = True
 
 
+AUTO, IN_SPACE, IN_THE_IMAGE = "auto", "depth", "flow"
+"""What takes the best method, and which that is with and without depth, poses and a camera (docs/keyframes.md)."""
+
 PROPAGATIONS: dict[str, Method] = {
     "hold": Method(Hold.needs, lambda classes, seed: Hold(), covers=False),
     "homography": Method(HomographyWarp.needs, lambda classes, seed: HomographyWarp(seed)),

@@ -11,7 +11,7 @@ from stsem.errors import CostError, OutputError, UsageError
 from stsem.log.log import Log, open_log
 from stsem.log.plan import NEEDS
 from stsem.replay import costing as module
-from stsem.replay.build import build_model
+from stsem.replay.build import build_model, settled
 from stsem.replay.calibrate import Subject
 from stsem.replay.costing import Costing, calibration_frames, costing
 from stsem.replay.modes import MODES
@@ -43,7 +43,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[Subject]:
 
 
 def ask(log: Log, **settings: Any) -> Costing:
-    config = validated({"model": "oracle", **settings})
+    config = settled(log, validated({"model": "oracle", **settings}))
     return costing(log, config, build_model(log, config), fused=True, say=lambda text: None)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from stsem.log.log import Log, open_log
 from stsem.log.plan import NEEDS
-from stsem.replay.build import build_model, needed_roles, truth_frames
+from stsem.replay.build import build_model, needed_roles, settled, truth_frames
 from stsem.replay.engine import replay_log
 from stsem.replay.posing import can_map
 from stsem.replay.settings import validated
@@ -56,7 +56,7 @@ def shown(results: list[FrameResult]) -> list[tuple[Any, ...]]:
 )
 def test_the_same_outcomes(gappy_log: Log, made_up_costs: Path, settings: dict[str, Any]) -> None:
     """Outcomes, keyframes, reasons and every instant are those of the real run."""
-    config = validated({"model": "oracle", **settings})
+    config = settled(gappy_log, validated({"model": "oracle", **settings}))
     model, fused = build_model(gappy_log, config), can_map(gappy_log, config)
     source = ProfileCosts(load_profile(made_up_costs), config.seed, gappy_log.info.sha256)
     costs: Callable[[object], CostSource] = lambda mode: source  # noqa: E731
@@ -71,7 +71,7 @@ def test_the_same_outcomes(gappy_log: Log, made_up_costs: Path, settings: dict[s
 
 def test_patience(gappy_log: Log) -> None:
     """The clock of a search runs on for the deadline, so that the last frames can be answered within it."""
-    config = validated({"model": "oracle", "mode": "per-frame", "queue": "lossless", "map": False})
+    config = settled(gappy_log, validated({"model": "oracle", "mode": "per-frame", "queue": "lossless", "map": False}))
     (mode,) = config.modes
     costs: Callable[[object], CostSource] = lambda mode: ConstantCosts({"segment": 50 * MS})  # noqa: E731
     pending = []
@@ -85,7 +85,7 @@ def test_patience(gappy_log: Log) -> None:
 
 def test_an_attempt_leaves_nothing_behind(gappy_log: Log, made_up_costs: Path) -> None:
     """Rates may be tried in any order."""
-    config = validated({"model": "oracle"})
+    config = settled(gappy_log, validated({"model": "oracle"}))
     source = ProfileCosts(load_profile(made_up_costs), 0, gappy_log.info.sha256)
     probe = Probe(gappy_log, config, lambda mode: source, needs=NEEDS, fused=True, usable=truth_frames(gappy_log))
     for mode in config.modes:
