@@ -60,7 +60,7 @@ def test_auto_measures_once(log: Log, measured: list[Subject]) -> None:
 @pytest.mark.parametrize(
     ("settings", "again"),
     [
-        ({"seed": 9}, False), ({"keyframes": "every:3"}, False), ({"queue": "lossless"}, False),
+        ({"seed": 9}, False), ({"keyframes": "every:3"}, True), ({"queue": "lossless"}, False),
         ({"cores": 1}, True), ({"propagation": "hold"}, True), ({"count_decode": True}, True),
     ],
     ids=str,
