@@ -70,7 +70,7 @@ class DistanceRow(Part):
     frames: Count
     """Distance to the keyframe as a difference of log indices; 0 is the keyframe itself."""
     ms: Number = None
-    """Median distance to the keyframe in milliseconds of capture time."""
+    """Mean time since the keyframe over these frames, milliseconds of capture time."""
     miou: Share = None
     """mIoU of the frames at this distance, as in `Score`. Fraction."""
     pixel_accuracy: Share = None

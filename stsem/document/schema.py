@@ -64,9 +64,10 @@ class Run(Part):
     modes whose answers wait for the network, and without a clock."""
     covered: Share = None
     """Mean over the predicted answers of the share of pixels that rest on evidence: a keyframe saw the point, so far as
-    the method can tell. null where the method does not say. Fraction."""
+    the method can tell. Of the real-time run; offline where that is the only pass. null where the method does not
+    say. Fraction."""
     remarks: dict[str, Count] = Field(default_factory=dict)
-    """What the prediction had to do without, for how many frames."""
+    """What the prediction had to do without, for how many frames; of the same pass as `covered`."""
     keyframes_moved: Count = 0
     """Oracle only: choices moved to the next frame that has truth."""
     stages_inside: tuple[str, ...] = ()

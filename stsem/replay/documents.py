@@ -198,8 +198,9 @@ def _other_method(context: Context) -> list[str]:
 def _second_keyframe(context: Context) -> list[str]:
     """That profiles know what it takes to register a frame to one keyframe, not to two."""
     profile, config = None if context.costing is None else context.costing.profile, context.config
-    both = policy_of(config).needs_homography and PROPAGATIONS[config.propagation].needs.points
-    if profile is None or not both:
+    policy = policy_of(config)
+    looks = policy.needs_homography or policy.needs_coverage
+    if profile is None or not (looks and PROPAGATIONS[config.propagation].needs.points):
         return []
     return [
         f"{mode.name} registers a frame to two keyframes while a newer one is on its way, but the cost profile was "

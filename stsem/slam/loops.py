@@ -33,7 +33,7 @@ MAX_DISTANCE_M = 4.0
 
 @dataclass(frozen=True)
 class Tried:
-    """What became of a candidate: `not alike`, `too far`, `no match`, `alone` or `loop`; for the report."""
+    """What became of a candidate: `too far`, `no match`, `alone` or `loop`."""
 
     keyframe: int
     candidate: int

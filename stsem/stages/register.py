@@ -24,10 +24,12 @@ class Anchor:
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """Args:
-    features: of this frame, kept in case it becomes a keyframe; None if nobody looks at any.
-    homographies: log index of a keyframe -> its pixels to this frame's; None if none can be trusted.
-    coverage: share of the pixels that keyframes cover, foretold; None if nobody asks or knows.
+    """What relates a frame to those before it.
+
+    Args:
+        features: of this frame, kept in case it becomes a keyframe; None if nobody looks at any.
+        homographies: log index of a keyframe -> its pixels to this frame's; None if none can be trusted.
+        coverage: share of the pixels that keyframes cover, foretold; None if nobody asks or knows.
     """
 
     features: Features | None = None

@@ -76,13 +76,15 @@ def test_age(replay: Cli, home: Path, slow: Path, tiny_log: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("flags", "said"), [((), True), (("--propagation", "flow"), False), (("--keyframes", "every:2"), False)]
-)
+    ("flags", "said"),
+    [((), True), (("--keyframes", "coverage"), True), (("--propagation", "flow"), False),
+     (("--keyframes", "every:2"), False)],
+)  # fmt: skip
 def test_what_the_profile_does_not_know(
     replay: Cli, home: Path, tiny_log: Path, flags: tuple[str, ...], said: bool
 ) -> None:
     """Policy and method match points, each with a keyframe of its own; no profile was measured with two."""
-    base = ("--model", "oracle", "--mode", "keyframe-async", "--no-offline", *flags)
+    base = ("--model", "oracle", "--mode", "keyframe-async", "--no-offline", "--propagation", "homography", *flags)
     assert replay(tiny_log, *base, "--out", "r").code == 0
     assert any("registers a frame to two keyframes" in text for text in report("r")["warnings"]) == said
 

@@ -34,9 +34,11 @@ def test_every_method(replay: Cli, home: Path, method: str) -> None:
 def test_real_time(replay: Cli, home: Path, tiny_log: Path, made_up_costs: Path) -> None:
     """Methods that follow the image register even where the policy does not ask; a frame waits for its depth and pose.
 
-    A profile that was not measured with the method is said to be foreign.
+    A profile that was not measured with the method is said to be foreign. What answers rest on is said without an
+    offline pass, too.
     """
-    common = ("--model", "oracle", "--keyframes", "every:6", "--costs", made_up_costs, "--map", "off", "--no-plots")
+    common = ("--model", "oracle", "--keyframes", "every:6", "--costs", made_up_costs, "--map", "off", "--no-plots",
+              "--no-offline")  # fmt: skip
     for method, inside, said in (
         ("hold", ["segment", "propagate"], True), ("homography", ["register", "segment", "propagate"], False),
         ("flow", ["register", "segment", "propagate"], True), ("depth", ["register", "segment", "propagate"], True),
@@ -46,6 +48,8 @@ def test_real_time(replay: Cli, home: Path, tiny_log: Path, made_up_costs: Path)
         assert document["runs"][1]["stages_inside"] == inside
         foreign = f"measured with --propagation homography (register: points), but the run used {method}"
         assert any(foreign in warning for warning in document["warnings"]) == said
+        evidence = "`keyframe`, as delivered: "
+        assert (evidence in (Path(method) / "report.md").read_text()) == (method != "hold")
 
 
 def test_a_profile_names_its_method(replay: Cli, home: Path, tiny_log: Path) -> None:

@@ -84,18 +84,17 @@ def _part(run: Run, name: str) -> tuple[str, str]:
 def distance_section(document: Document) -> Section | None:
     """Accuracy by distance to the keyframe."""
     runs = [run for run in document.runs if len(run.by_distance) > 1]
+    rests = [Text(said) for run in document.runs if (said := _evidence(run))]
     ages = _ages(document)
-    if not runs and not ages:
+    if not (runs or rests or ages):
         return None
     blocks: list[Block] = [Figure("distance", "mIoU over the distance to the keyframe")] if runs else []
     for run in runs:
         if run.by_distance_summary:
             blocks.append(Text(_summary(run, "distances", run.by_distance_summary)))
-        if said := _evidence(run):
-            blocks.append(Text(said))
-        note = "Offline pass. Distance 0 is the keyframe itself; ms: median of capture time."
+        note = "Offline pass. Distance 0 is the keyframe itself; ms: mean of capture time."
         blocks.append(Folded(f"By distance, {run.mode}", (_distances(run.by_distance, note),)))
-    return Section("By distance to the keyframe", (*blocks, *ages))
+    return Section("By distance to the keyframe", (*blocks, *rests, *ages))
 
 
 def _ages(document: Document) -> list[Block]:
@@ -111,9 +110,7 @@ def _ages(document: Document) -> list[Block]:
             said += " " + _summary(run, "ages", beside.by_age_summary)
         blocks.append(Text(said))
         if beside.by_age:
-            note = (
-                "Delivered. Age: from the keyframe that the labels come from to the frame; ms: median of capture time."
-            )
+            note = "Delivered. Age: from the keyframe that the labels come from to the frame; ms: mean of capture time."
             blocks.append(Folded(f"By age, {run.mode}", (_distances(beside.by_age, note),)))
     return blocks
 
@@ -130,7 +127,8 @@ def _evidence(run: Run) -> str:
     """What predicted answers rest on, and what they had to do without; "" where nobody says."""
     said = [] if run.covered is None else [f"{percent(run.covered)} % of the pixels of predicted answers are covered"]
     said += [f"{plural(frames, 'frame')} predicted with {what}" for what, frames in run.remarks.items()]
-    return f"`{run.mode}`: {'; '.join(said)}." if said else ""
+    answers = "offline" if run.clock == "offline" else "as delivered"
+    return f"`{run.mode}`, {answers}: {'; '.join(said)}." if said else ""
 
 
 def _distances(found: tuple[DistanceRow, ...], note: str) -> Table:
