@@ -20,7 +20,7 @@ class Keyframe:
         stamp_ns: its capture stamp.
         T_WC: (4, 4), the world being the camera of the first keyframe.
         landmarks: points, descriptors, and places in the camera.
-        depth: (H, W) float32 metres, as it came.
+        depth: (H, W) float32 metres, as it came, by which landmarks may be placed anew; None when they never will be.
         grid: planes of the surface, to which later frames add what they see.
     """
 
@@ -28,7 +28,7 @@ class Keyframe:
     stamp_ns: int
     T_WC: Pose
     landmarks: Landmarks
-    depth: Depth
+    depth: Depth | None
     grid: PlaneGrid
 
     @property

@@ -200,13 +200,18 @@ class Tracker:
         self._zoom.add(expected, (points.xy - before) / self._ratio)
 
     def _rezoomed(self) -> None:
-        """Takes the ratio of focal lengths as it is known now, and places all landmarks by it."""
+        """Takes the ratio of focal lengths as it is known now, and places all landmarks by it.
+
+        When it is settled, depth images are let go: they would be half of what a keyframe holds.
+        """
         change = self._zoom.ratio / self._ratio
         if abs(change - 1) > ZOOM_STEP:
             self._ratio = self._zoom.ratio
             self.keyframes = [
                 replace(one, landmarks=zoomed(one.landmarks, change, one.depth, self._camera)) for one in self.keyframes
             ]
+        if self._zoom.settled and self.keyframes[-1].depth is not None:
+            self.keyframes = [one if one.depth is None else replace(one, depth=None) for one in self.keyframes]
 
     def _accept(
         self, view: _View, found: Aligned, seen: Resection | None, points: Sighting | None, status: Status

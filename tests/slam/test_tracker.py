@@ -1,5 +1,7 @@
 """The tracker in a made-up room, where every pose is known."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -42,6 +44,19 @@ def test_a_known_walk_is_found(noise: float, most_m: float) -> None:
         T = inverse(WALK[tracker.keyframes[edge.first].index]) @ WALK[tracker.keyframes[edge.second].index]
         np.testing.assert_allclose(edge.T, T, atol=2 * most_m)
         assert np.linalg.eigvalsh(edge.information)[0] > 0
+
+
+def test_depth_images_are_kept_until_landmarks_are_settled() -> None:
+    """They are the larger half of a keyframe, and a long log has thousands."""
+    there = [frame(i, T) for i, T in enumerate(WALK)]
+    tracker, swing = Tracker(CAMERA, 3), [*there, *there[-2:0:-1]]
+    held = []
+    for i in range(64):
+        tracker.track(replace(swing[i % len(swing)], index=i))
+        held.append({one.depth is not None for one in tracker.keyframes})
+    assert held[0] == {True}
+    assert held[-1] == {False}
+    assert {True, False} not in held
 
 
 def test_dark_frames_are_lost_with_a_reason_and_then_found_again() -> None:
