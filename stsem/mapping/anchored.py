@@ -14,43 +14,43 @@ from stsem.mapping.cloud import LabelledCloud, LabelledPoints
 from stsem.pose import Pose
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Part:
-    """The points of one frame.
+    """What one frame added.
 
     Args:
-        anchor: number of the keyframe they hang on.
-        points: in the axes of its camera, metres.
+        anchor: number of the keyframe that the points hang on.
+        rows: of the points of that anchor.
     """
 
     anchor: int
-    points: LabelledPoints
+    rows: slice
 
 
 class AnchoredCloud:
     """Parts in the order they came.
 
     Args:
-        cell_m: edge of a cell of the world's map, metres. A part is thinned to cells of half that edge, so that what it
-            keeps still fills the map's cells wherever it is moved.
-        max_points: of the world's map.
+        cell_m: edge of a cell of the world's map, metres. What hangs on one anchor is thinned to cells of half that
+            edge: it still fills the map's cells wherever it is moved, and a camera that stays adds nothing.
+        max_points: of the world's map, and of each anchor.
     """
 
     def __init__(self, cell_m: float = 0.05, max_points: int = 4_000_000) -> None:
         self._cell_m, self._max_points = cell_m, max_points
         self._parts: list[Part] = []
-        self._left_out = 0
+        self._anchors: dict[int, LabelledCloud] = {}
 
     def __len__(self) -> int:
         return len(self._parts)
 
     def add(self, anchor: int, points: LabelledPoints) -> int:
-        """Keep the points of one frame, in the axes of the anchor; returns how many are kept."""
-        thinned = LabelledCloud(self._cell_m / 2, self._max_points)
-        thinned.add(points)
-        self._left_out += thinned.left_out
-        self._parts.append(Part(anchor, thinned.points))
-        return len(thinned)
+        """Keep what one frame adds, in the axes of the anchor; returns how many points that are."""
+        kept = self._anchors.setdefault(anchor, LabelledCloud(self._cell_m / 2, self._max_points))
+        before = len(kept)
+        added = kept.add(points)
+        self._parts.append(Part(anchor, slice(before, before + added)))
+        return added
 
     def cloud(self, poses: Sequence[Pose]) -> LabelledCloud:
         """The map with the anchors at `poses` (T_WC of every keyframe of SLAM); parts merge in the order they came.
@@ -58,13 +58,14 @@ class AnchoredCloud:
         Raises:
             ValueError: a part hangs on a keyframe that has no pose.
         """
-        last = max((part.anchor for part in self._parts), default=-1)
+        last = max(self._anchors, default=-1)
         if last >= len(poses):
             raise ValueError(f"points hang on keyframe {last}, but {len(poses)} poses came")
         whole = LabelledCloud(self._cell_m, self._max_points)
-        whole.left_out = self._left_out
+        whole.left_out = sum(kept.left_out for kept in self._anchors.values())
+        points = {anchor: kept.points for anchor, kept in self._anchors.items()}
         for part in self._parts:
-            whole.add(moved(part.points, poses[part.anchor]))
+            whole.add(moved(points[part.anchor].part(part.rows), poses[part.anchor]))
         return whole
 
 

@@ -54,6 +54,17 @@ def test_points_go_with_their_keyframe_and_only_with_it() -> None:
     assert len(cloud) == 2
 
 
+def test_a_camera_that_stays_adds_nothing() -> None:
+    """Memory grows with what is seen, not with the frames that see it; who was first stays."""
+    cloud, wall = AnchoredCloud(cell_m=0.1), LabelledPoints(*_wall())
+    assert cloud.add(0, wall) == 1600
+    again = LabelledPoints(wall.xyz, wall.rgb, wall.labels + np.uint8(1))
+    assert [cloud.add(0, again) for _ in range(3)] == [0, 0, 0]
+    assert cloud.add(1, again) == 1600
+    assert len(cloud) == 5
+    assert set(cloud.cloud([np.eye(4)] * 2).points.labels.tolist()) == {0}
+
+
 def test_two_visits_become_one_surface_when_the_loop_closes() -> None:
     """A wall seen twice, the second time 30 cm off, is double before and single after."""
     wall = LabelledPoints(*_wall())
