@@ -191,26 +191,23 @@ class TrajectoryAccuracy:
     Args:
         ate: absolute errors in metres, aligned without scale.
         per_metre, per_second: relative errors over 1 m of the true path, and over 1 s.
-        tracked_share: poses estimated over frames with depth; None without such frames.
         matched: poses that have a true one.
     """
 
     ate: Errors | None
     per_metre: RelativeErrors | None
     per_second: RelativeErrors | None
-    tracked_share: float | None
     matched: int
 
 
 def accuracy(
-    estimate: Trajectory, truth: Trajectory, *, frames_with_depth: int, max_difference_ns: int = MAX_DIFFERENCE_NS
+    estimate: Trajectory, truth: Trajectory, *, max_difference_ns: int = MAX_DIFFERENCE_NS
 ) -> TrajectoryAccuracy:
     """Judge an estimate against the truth, poses matched by `associate`.
 
     Args:
         estimate: a pose for each frame that was tracked, none for one that was not.
         truth: in any other world frame.
-        frames_with_depth: frames that could have been tracked.
         max_difference_ns: stamps farther apart do not match.
     """
     rows, true_rows = associate(estimate.stamps_ns, truth.stamps_ns, max_difference_ns)
@@ -219,7 +216,6 @@ def accuracy(
         ate=_unless_refused(lambda: absolute_errors(found, wanted)),
         per_metre=_unless_refused(lambda: relative_errors_per_metre(found, wanted)),
         per_second=_unless_refused(lambda: relative_errors_per_second(stamps_ns, found, wanted)),
-        tracked_share=len(estimate) / frames_with_depth if frames_with_depth else None,
         matched=len(rows),
     )
 

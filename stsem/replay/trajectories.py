@@ -9,7 +9,7 @@ import numpy as np
 from stsem.document.accuracy import Score
 from stsem.document.trajectory import PoseSide, TrajectoryScore
 from stsem.log.log import Log
-from stsem.metrics.trajectory import RelativeErrors, TrajectoryAccuracy, accuracy, associate, umeyama
+from stsem.metrics.trajectory import MIN_POSES, RelativeErrors, TrajectoryAccuracy, accuracy, associate, umeyama
 from stsem.pose import Trajectory
 from stsem.replay.posing import Posing, log_poses
 from stsem.stages.track import SlamTracker
@@ -80,8 +80,9 @@ def why_not(log: Log, posing: Posing, scored: TrajectoryScore | None) -> dict[st
         return {"trajectory.ate_rmse_m": "the log's poses are used as they are"}
     if log.trajectory is None:
         return {"trajectory.ate_rmse_m": "the log has no poses to compare with"}
+    few = f"fewer than {MIN_POSES} poses have a counterpart in the log"
     reasons = {
-        "ate_rmse_m": "fewer than three poses have a counterpart in the log, or all lie on one line",
+        "ate_rmse_m": few if scored.n < MIN_POSES else "all poses lie on one line, along which no turn can be told",
         "rpe_translation_m": "no two compared poses are one second apart",
         "rpe_per_metre_translation_m": "no two compared poses are one metre apart",
     }
@@ -96,7 +97,7 @@ def _of_tracking(
     judged = None
     if log is not None and len(log):
         sides.insert(0, _side("log", log, offline.get("log")))
-        judged = accuracy(slam, log, frames_with_depth=counts.with_depth, max_difference_ns=0)
+        judged = accuracy(slam, log, max_difference_ns=0)
     return TrajectoryScore(
         pose="slam", tracked_share=counts.tracked / counts.with_depth if counts.with_depth else None,
         lost=counts.lost, relocalised=counts.relocalised, keyframes=counts.keyframes, loops=counts.loops,

@@ -82,18 +82,18 @@ def test_a_gap_is_not_bridged() -> None:
 
 
 def test_accuracy_of_a_trajectory() -> None:
-    """Matched within 20 ms, aligned, over frames with depth; what cannot be told is None."""
+    """Matched within 20 ms, aligned; what cannot be told is None."""
     estimate, truth = walk(60, 7)
     stamps = np.arange(60, dtype=np.int64) * 100_000_000
     tracked = np.flatnonzero(np.arange(60) % 10 != 3)
     late = Trajectory(stamps[tracked] + 15_000_000, estimate[tracked])
-    found = accuracy(late, Trajectory(stamps, truth), frames_with_depth=60)
+    found = accuracy(late, Trajectory(stamps, truth))
     assert found.ate == absolute_errors(estimate[tracked], truth[tracked])
-    assert (found.tracked_share, found.matched) == (0.9, 54)
+    assert found.matched == 54
     assert found.per_second is not None
     assert found.per_metre is not None
-    far = accuracy(Trajectory(stamps + 30_000_000, estimate), Trajectory(stamps, truth), frames_with_depth=0)
-    assert (far.ate, far.per_metre, far.per_second, far.tracked_share, far.matched) == (None, None, None, None, 0)
+    far = accuracy(Trajectory(stamps + 30_000_000, estimate), Trajectory(stamps, truth))
+    assert (far.ate, far.per_metre, far.per_second, far.matched) == (None, None, None, 0)
 
 
 def test_per_second_of_regular_frames_contains_the_frames() -> None:
