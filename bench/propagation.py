@@ -12,6 +12,7 @@ import argparse
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -65,13 +66,19 @@ class Carry(DepthWarp):
         return seen
 
 
+def _flow(search: Search, side: int, classes: ClassSet) -> Flow:
+    return Flow(search, side)
+
+
 METHODS: dict[str, Callable[[ClassSet], Propagation]] = {
     **{name: lambda classes, make=row.make: make(classes, SEED) for name, row in PROPAGATIONS.items()},
     "bare": lambda classes: Bare(),
     "carry": Carry,
     **{
-        f"flow:{name},{finest},{side}": lambda classes, search=Search(preset, finest), side=side: Flow(search, side)
-        for name, preset in PRESETS.items() for finest in (0, 1, 2) for side in (320, 400, 480, 640, 800, 960)
+        f"flow:{name},{finest},{side}": partial(_flow, Search(preset, finest), side)
+        for name, preset in PRESETS.items()
+        for finest in (0, 1, 2)
+        for side in (320, 400, 480, 640, 800, 960)
     },
 }
 """Those of a replay, and what docs/propagation.md compares them with."""

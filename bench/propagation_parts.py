@@ -24,7 +24,8 @@ TIMED: tuple[tuple[Any, str, str], ...] = (
     (carry, "among", "- earlier keyframes"),
     (depth_method, "described", "description"),
     (depth_method, "completed", "likeness"),
-    (likeness.Likeness, "classify", "- nearest examples"),
+    (likeness.Likeness, "votes", "- nearest examples"),
+    (likeness, "diffused", "- neighbours"),
 )
 """(where it is looked up, its name, how it is printed); a dash marks a part of the part above."""
 

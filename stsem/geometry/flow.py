@@ -32,8 +32,8 @@ class Search:
 
     Args:
         preset: one of cv2.DISOPTICAL_FLOW_PRESET_*.
-        finest: the level of the pyramid that it ends at, 0 being the image itself; None as the preset has it. It decides
-            more than the preset does (docs/propagation.md).
+        finest: the level of the pyramid that it ends at, 0 being the image itself; None as the preset has it. It
+            decides more than the preset does (docs/propagation.md).
     """
 
     preset: int = cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST
@@ -49,10 +49,11 @@ def working_grey(image: Image, *, side: int = WORKING_SIDE) -> Grey:
     """(h, w) uint8: `image` (H, W, 3) in grey, its longer side at most `side` pixels."""
     height, width = image.shape[:2]
     scale = side / max(width, height)
+    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     if scale < 1:
         size = max(1, round(width * scale)), max(1, round(height * scale))
-        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
+        grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(grey, np.uint8)
 
 
 def backward_flow(current: Grey, previous: Grey, *, search: Search = SEARCH) -> Field:

@@ -3,7 +3,8 @@
 Floors, walls and ceilings go on where the image of a keyframe ended, a chair looks like the chair beside it, and a
 person keeps the colour of the clothes. So each point is described by place, height, direction of the surface and
 colour, and takes the label that its nearest neighbours among the labelled points vote for, a neighbour at the distance
-d with the weight 1 / (d + SOFT) (after Dudani 1976). It is a guess, never evidence: what it labels stays uncovered.
+d with the weight 1 / (d + SOFT) (after Dudani 1976), and that those beside it on the same surface vote for. It is a
+guess, never evidence: what it labels stays uncovered.
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from scipy.spatial import cKDTree
 from stsem.classes import NO_LABEL, Labels
 from stsem.frame import Image
 from stsem.geometry.carried import Bools, Carried
+from stsem.geometry.diffusion import Votes, diffused
 from stsem.geometry.reproject import View
 
 Features = npt.NDArray[np.float32]
@@ -105,19 +107,27 @@ class Likeness:
     examples: tuple[Examples, ...]
     slack: float = SLACK
 
-    def classify(self, features: Features) -> tuple[Labels, npt.NDArray[np.float32]]:
-        """Label (n,) and share of the votes (n,) 0..1 for `features` (n, 9); there must be at least one example."""
+    def votes(self, features: Features, classes: int) -> Votes:
+        """(n, classes) shares of the votes for `features` (n, 9); there must be at least one example.
+
+        Args:
+            features: of the points asked for.
+            classes: more than any label of an example.
+        """
         labels = self._labels
         voters = np.arange(1, 1 + min(VOTERS, len(labels)))
         found = self._tree.query(self._with_height(features), k=voters, eps=self.slack)
         distances, nearest = np.asarray(found[0], np.float64), np.asarray(found[1], np.intp)
         weights, voted = 1 / (distances + SOFT), labels[nearest]
-        votes = np.zeros((len(features), int(labels.max()) + 1))
+        votes, each = np.zeros((len(features), classes)), np.arange(len(features))
         for weight, label in zip(weights.T, voted.T, strict=True):
-            votes[np.arange(len(features)), label] += weight
-        chosen = votes.argmax(axis=1)
-        shares = votes[np.arange(len(features)), chosen] / weights.sum(axis=1)
-        return chosen.astype(np.uint8), shares.astype(np.float32)
+            votes[each, label] += weight
+        return np.asarray(votes / weights.sum(axis=1, keepdims=True), np.float32)
+
+    @property
+    def classes(self) -> int:
+        """One more than the highest label of the examples."""
+        return int(self._labels.max(initial=0)) + 1
 
     @cached_property
     def _labels(self) -> Labels:
@@ -177,9 +187,9 @@ def completed(answer: Carried, cells: Cells, likeness: Likeness) -> Carried:
     asked = cells.known & ~np.asarray(cells.middles(answer.covered), np.bool_)
     if not len(likeness) or not asked.any():
         return answer
-    found, shares = likeness.classify(cells.features[asked])
+    votes = _votes(answer, cells, likeness, asked)
     guessed, share = np.full(asked.shape, NO_LABEL, np.uint8), np.zeros(asked.shape, np.float32)
-    guessed[asked], share[asked] = found, shares
+    guessed[asked], share[asked] = votes.argmax(axis=1), votes.max(axis=1)
     spread = cells.spread(guessed, answer.labels.shape)
     here = (spread != NO_LABEL) & ~answer.covered
     labels, confidence = np.where(here, spread, answer.labels), answer.confidence
@@ -187,6 +197,21 @@ def completed(answer: Carried, cells: Cells, likeness: Likeness) -> Carried:
         steps = cells.spread(np.rint(share * 255).astype(np.uint8), labels.shape)
         confidence = np.where(here, steps.astype(np.float32) / np.float32(255), confidence)
     return Carried(labels, confidence, answer.covered)
+
+
+def _votes(answer: Carried, cells: Cells, likeness: Likeness, asked: Bools) -> Votes:
+    """(n, classes) for the cells `asked` for: the votes of their likes, and of what lies beside them."""
+    labels = np.asarray(cells.middles(answer.labels), np.uint8)
+    seen = cells.known & ~asked & (labels != NO_LABEL)
+    classes = max(likeness.classes, int(labels[seen].max(initial=0)) + 1)
+    votes = np.zeros((*asked.shape, classes), np.float32)
+    votes[seen, labels[seen]] = 1
+    votes[asked] = likeness.votes(cells.features[asked], classes)
+    place, normal, colour = (
+        cells.features[..., first : first + 3] * np.float32(scale)
+        for first, scale in ((0, PLACE_M), (3, NORMAL), (6, COLOUR))
+    )
+    return diffused(votes, asked, place, normal, colour)
 
 
 def remembered(examples: Sequence[Examples]) -> Likeness:
@@ -214,4 +239,6 @@ def _normals(place: Features) -> Features:
     length = np.sqrt(x * x + y * y + z * z)
     known = length > 0
     length[~known] = 1
-    return np.asarray(np.stack([np.where(known, axis / length, np.float32(0)) for axis in (x, y, z)], axis=2), np.float32)
+    return np.asarray(
+        np.stack([np.where(known, axis / length, np.float32(0)) for axis in (x, y, z)], axis=2), np.float32
+    )

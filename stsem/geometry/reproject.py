@@ -117,9 +117,7 @@ def correspond(current: View, keyframe: View, *, agreement: Agreement = DEFAULT_
     return Correspondence(partners, found, rows=None)
 
 
-def among(
-    current: View, keyframe: View, rows: Rows, *, agreement: Agreement = DEFAULT_AGREEMENT
-) -> Correspondence:
+def among(current: View, keyframe: View, rows: Rows, *, agreement: Agreement = DEFAULT_AGREEMENT) -> Correspondence:
     """`correspond` for the pixels `rows` (n,) of the current frame, counted row by row; none beside is tried."""
     if not len(rows):
         return Correspondence(np.empty((0, 1, 2), np.int16), np.empty((0, 1), np.bool_), rows)
@@ -131,7 +129,9 @@ def among(
 def _packed(rows: Rows) -> Rows:
     """(h, w) of `rows` (n,), the last one repeated at the end."""
     width = min(PACKED_WIDTH, len(rows))
-    return np.pad(rows, (0, -len(rows) % width), mode="edge").reshape(-1, width)
+    packed = np.full((-(-len(rows) // width), width), rows[-1])
+    packed.reshape(-1)[: len(rows)] = rows
+    return packed
 
 
 def _pixels(view: View, packed: Rows) -> Pixels:
