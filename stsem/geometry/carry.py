@@ -95,14 +95,15 @@ def _asked(
     """Each source with its pairs: of all pixels for the first, then of those that `labels` still lacks."""
     for source in sources[:1]:
         yield source, correspond(current, source.view, agreement=agreement)
-    asked, rows = 0, None
+    if len(sources) < 2:
+        return
+    asked, flat = 0, labels.reshape(-1)
+    rows = np.flatnonzero((labels == NO_LABEL) & (current.depth > 0))
     for source in sources[1:]:
         if asked == max_earlier:
             return
-        if rows is None:
-            rows = np.flatnonzero((labels == NO_LABEL) & (current.depth > 0))
         sample = rows[:: max(1, len(rows) // SAMPLES)]
         hits = np.count_nonzero(among(current, source.view, sample, agreement=agreement).found)
         if hits * len(rows) > MIN_GAIN * labels.size * len(sample):
             yield source, among(current, source.view, rows, agreement=agreement)
-            asked, rows = asked + 1, None
+            asked, rows = asked + 1, rows[flat.take(rows) == NO_LABEL]

@@ -191,11 +191,12 @@ def completed(answer: Carried, cells: Cells, likeness: Likeness) -> Carried:
     guessed, share = np.full(asked.shape, NO_LABEL, np.uint8), np.zeros(asked.shape, np.float32)
     guessed[asked], share[asked] = votes.argmax(axis=1), votes.max(axis=1)
     spread = cells.spread(guessed, answer.labels.shape)
-    here = (spread != NO_LABEL) & ~answer.covered
-    labels, confidence = np.where(here, spread, answer.labels), answer.confidence
+    here = ((spread != NO_LABEL) & ~answer.covered).view(np.uint8)
+    labels, confidence = answer.labels.copy(), answer.confidence
+    cv2.copyTo(spread, here, labels)
     if confidence is not None:
-        steps = cells.spread(np.rint(share * 255).astype(np.uint8), labels.shape)
-        confidence = np.where(here, steps.astype(np.float32) / np.float32(255), confidence)
+        steps, confidence = cells.spread(np.rint(share * 255).astype(np.uint8), labels.shape), confidence.copy()
+        cv2.copyTo(steps.astype(np.float32) / np.float32(255), here, confidence)
     return Carried(labels, confidence, answer.covered)
 
 
