@@ -12,7 +12,7 @@ def space_section(document: Document) -> Section | None:
     trajectory, sides, of_map = (
         _scores(document, "trajectory", TrajectoryScore), _sides(document), _scores(document, "map", MapScore),
     )  # fmt: skip
-    figure = Figure("trajectory", "the path of the camera from above, by SLAM and by the log") if sides else None
+    figure = Figure("trajectory", "the path of the camera from above") if sides else None
     blocks: list[Block | None] = [figure, sides, trajectory, of_map]
     found = tuple(block for block in blocks if block is not None)
     return Section("Poses and map", found) if found else None
