@@ -11,6 +11,7 @@ from stsem.errors import EXIT_FINE, EXIT_LOSSY, EXIT_NOTHING_MEASURED
 from stsem.inference.backends import BACKENDS
 from stsem.inference.cpu import cpu_features
 from stsem.log.log import Log
+from stsem.replay.behind import fell_behind
 from stsem.replay.build import policy_of
 from stsem.replay.calibrate import registers
 from stsem.replay.comparison import Contender, compare
@@ -219,6 +220,7 @@ def _warnings(context: Context) -> tuple[str, ...]:
         for run in context.replayed.runs
         if run.real_time is not None and not any(result.outcome.is_answer for result in run.real_time.results)
     ]
+    found += [said for run in context.replayed.runs for said in fell_behind(context, run)]
     if context.config.cores == 1 and context.config.clock == "real-time":
         found += [
             f"{mode.name} needs two cores to answer while the network works; with one, answers wait for it."

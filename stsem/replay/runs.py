@@ -195,12 +195,12 @@ def _disabled(context: Context, run: ModeRun) -> dict[str, int]:
     """Keyframes that `fuse` could not use, because an optional channel is missing for them."""
     if run.cloud is None:
         return {}
-    lacking = sum(not _fusable(context, run, index) for index in run.keyframes)
+    lacking = sum(not fusable(context, run, index) for index in run.keyframes)
     return {"fuse": lacking} if lacking else {}
 
 
-def _fusable(context: Context, run: ModeRun, index: int) -> bool:
-    """Whether a keyframe has depth and a pose."""
+def fusable(context: Context, run: ModeRun, index: int) -> bool:
+    """Whether the keyframe with a log index has depth and a pose."""
     missing = context.log.plans[index].missing(NEEDS)
     return not missing if run.tracker is None else "depth" not in missing and run.tracker.anchor(index) is not None
 

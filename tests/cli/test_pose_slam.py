@@ -1,5 +1,6 @@
 """`--pose slam`: poses from the images themselves, beside the log's."""
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -140,6 +141,19 @@ def test_same_bytes_twice(replay: Cli, home: Path) -> None:
     """Promise P1 with SLAM on the path."""
     arguments = ("--propagation", "depth", "--pose", "slam", "--end", "0.6", "--repeat", "2", "--out", "r")
     assert replay(TINY, *KEYFRAME[:-1], *arguments).code == 0
+
+
+def test_work_beside_the_answers_that_is_not_done_is_said(replay: Cli, home: Path) -> None:
+    """Tracking slower than the camera: frames that nobody had tracked, and keyframes that waited for it."""
+    samples = {"segment@1": [10**7], "register@1": [10**6], "propagate@1": [10**6], "fuse@1": [10**6]}
+    modes = ("--model", "oracle", "--mode", "per-frame", "--no-offline", "--no-plots", "--pose", "slam")
+    for track_ms, said in ((20, []), (150, ["fell behind: 5 of 16 frames", "6 of 16 keyframes are not in the map"])):
+        profile = {"schema": "stsem-costs/1", "machine": "m", "samples_ns": samples | {"track@1": [track_ms * 10**6]}}
+        (home / "costs.json").write_text(json.dumps(profile))
+        assert replay(TINY, *modes, "--end", SECONDS, "--costs", "costs.json", "--out", "r").code == 0
+        warnings = report("r")["warnings"]
+        assert [any(text in warning for warning in warnings) for text in said] == [True] * len(said)
+        assert len([warning for warning in warnings if warning.startswith("per-frame")]) == len(said)
 
 
 @pytest.mark.parametrize(
