@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stsem.log.log import Loaded, Log
+from stsem.log.poses.source import MAX_GAP_NS
 from stsem.pose import Trajectory
 from stsem.replay.config import PoseSource, RunConfig
-
-MAX_POSE_GAP_NS = 150_000_000
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ def log_poses(log: Log) -> Trajectory | None:
     if log.trajectory is None:
         return None
     stamps = np.unique(np.fromiter((plan.stamp_ns for plan in log.plans), np.int64, len(log.plans)))
-    found = log.trajectory.brackets(stamps, MAX_POSE_GAP_NS)
+    found = log.trajectory.brackets(stamps, MAX_GAP_NS)
     known = stamps[found.known]
     return Trajectory(known, log.trajectory.between(known, found.earlier[found.known], found.later[found.known]))
 
