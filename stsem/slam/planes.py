@@ -99,7 +99,7 @@ def plane_grid(depth: Depth, camera: Camera) -> PlaneGrid:
         depth: (H, W) float32 metres along z, NaN unknown.
         camera: of the depth's pixels, without distortion.
     """
-    block = max(1, round(camera.width / COLUMNS))
+    block = max(1, min(round(camera.width / COLUMNS), camera.height))
     width, height = camera.width // block, camera.height // block
     with np.errstate(divide="ignore"):
         raw = 1 / depth[: height * block, : width * block]
