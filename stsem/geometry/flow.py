@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.classes import Labels
-from stsem.frame import Image
+from stsem.frame import Depth, Image
 from stsem.geometry.carried import Bools, Carried
 from stsem.uncertainty import Confidence
 
@@ -111,6 +111,25 @@ class Chain:
         sure = None if confidence is None else _fetched(confidence, places)
         inside = cv2.resize(self.inside.view(np.uint8), size, interpolation=cv2.INTER_NEAREST_EXACT)
         return Carried(_fetched(labels, places), sure, np.asarray(inside, np.uint8).view(np.bool_))
+
+    def stays(self, depth: Depth, keyframe: Depth, *, within_m: float) -> Bools:
+        """(H, W) bool: where the chain ends at about the distance it began at, so that it may be one body all along.
+
+        Flow that stuck to the edge of what moves ends on it, while the frame shows what it uncovered, farther away.
+        Where either depth is unknown, it does not.
+
+        Args:
+            depth, keyframe: (H, W) metres of the current frame and of the keyframe.
+            within_m: how far a body may have come nearer or gone away.
+        """
+        height, width = self.inside.shape
+        scale = np.array([keyframe.shape[1] / width, keyframe.shape[0] / height], np.float32)
+        places = (self.places + np.float32(0.5)) * scale - np.float32(0.5)
+        there = cv2.remap(keyframe, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+        here = cv2.resize(depth, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
+        near = np.asarray(np.abs(np.asarray(here, np.float32) - there) <= within_m)
+        full = cv2.resize(near.view(np.uint8), depth.shape[::-1], interpolation=cv2.INTER_NEAREST_EXACT)
+        return np.asarray(full, np.uint8).view(np.bool_)
 
 
 def _full_size(places: Field, shape: tuple[int, ...], size: tuple[int, int]) -> Field:

@@ -68,6 +68,20 @@ def test_what_came_in_gets_the_label_of_the_border() -> None:
     assert carried.coverage == pytest.approx(86 / 96)
 
 
+def test_a_chain_stays_with_a_body_and_not_with_what_it_uncovers() -> None:
+    """A body 2 m away goes one pixel to the right before a wall at 5 m; flow that stuck says that it grew."""
+    keyframe, depth = np.full((40, 60), 5, np.float32), np.full((40, 60), 5, np.float32)
+    keyframe[10:30, 20:30] = depth[10:30, 22:32] = 2
+    depth[:2, :2] = np.nan
+    stuck = np.zeros((20, 30, 2), np.float32)
+    stuck[5:15, 11:16] = (-1, 0)
+    stays = Chain.start(np.zeros((20, 30), np.uint8)).extended(stuck).stays(depth, keyframe, within_m=0.5)
+    expected = np.ones((40, 60), np.bool_)
+    expected[:2, :2] = False
+    expected[10:30, 20:22] = False
+    assert (stays == expected).all()
+
+
 def test_labels_of_another_size_than_the_working_image_do_not_shift() -> None:
     blocks = np.kron(LABELS, np.ones((3, 3), np.uint8))
     carried = Chain.start(GREY).extended(flow(4, -2)).carry(blocks, None, (288, 192))

@@ -21,6 +21,8 @@ SAMPLES = 2048
 """Pixels by which the coverage of a frame is foretold."""
 FLOW_SIDE = 320
 """Longer side, in pixels, of the images between which flow is sought: most pixels come by depth."""
+STRIDE_M = 0.5
+"""How much nearer or farther a person may have come since the keyframe, so that what flow says of them is believed."""
 NO_SPACE = "no depth or pose: by flow"
 
 
@@ -34,7 +36,7 @@ class _Memory:
 
 
 class DepthWarp:
-    """Asks up to `KEPT` finished keyframes, the newest first; persons come by flow.
+    """Asks up to `KEPT` finished keyframes, the newest first; persons come by flow, where their distance agrees.
 
     What neither covers gets the label of the most similar points of those keyframes, and where its own depth is
     unknown, what flow says. A frame without depth, pose or camera is predicted by flow alone; a keyframe without them
@@ -81,12 +83,18 @@ class DepthWarp:
         by_flow, view = self._flow.predict(source, frame, registration), view_of(frame)
         if view is None:
             return Predicted(by_flow.answer, source.index, NO_SPACE)
-        answer = by_flow.answer
-        covered = np.zeros(answer.labels.shape, np.bool_) if answer.covered is None else answer.covered
-        rest = Carried(answer.labels, answer.confidence, covered)
+        rest = self._followed(by_flow.answer, source, view)
         seen = carry(view, [memory.source for memory in self._memory], rest, moving=self._moving)
         found = self._completed(seen, view, frame)
         return Predicted(Segmentation(found.labels, found.confidence, covered=found.covered), source.index)
+
+    def _followed(self, answer: Segmentation, source: Keyframe, view: View) -> Carried:
+        """What flow says; covered where the frame is still about as far away as the keyframe was."""
+        chain = self._flow.chain(source.index)
+        if answer.covered is None or chain is None or source.view is None:
+            return Carried(answer.labels, answer.confidence, np.zeros(answer.labels.shape, np.bool_))
+        stays = chain.stays(view.depth, source.view.depth, within_m=STRIDE_M)
+        return Carried(answer.labels, answer.confidence, answer.covered & stays)
 
     def _completed(self, seen: Carried, view: View, frame: Frame) -> Carried:
         """`seen` with guesses by likeness for what is not covered."""

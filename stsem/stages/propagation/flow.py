@@ -59,6 +59,10 @@ class Flow:
         carried = chain.carry(source.segmentation.labels, source.segmentation.confidence, frame.size)
         return Predicted(Segmentation(carried.labels, carried.confidence, covered=carried.covered), source.index)
 
+    def chain(self, index: int) -> Chain | None:
+        """From the frame seen last back to the keyframe `index`; None if it broke."""
+        return self._chains.get(index)
+
     def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
         """The share of the chain from the newest keyframe that never left the image."""
         chain = None if self._newest is None else self._chains.get(self._newest)
