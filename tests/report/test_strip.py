@@ -57,7 +57,9 @@ def test_the_errors_of_three_modes_have_room_below_the_pictures() -> None:
 
 def test_no_accuracy_below_zero_is_marked() -> None:
     """The room below the lines is for ticks of frames without an answer."""
-    figure = overview.draw(three_modes())
+    inputs = three_modes()
+    wrong = {mode: [replace(row, streaming=0.0) for row in inputs.rows(mode)] for mode in inputs.frames}
+    figure = overview.draw(replace(inputs, frames=wrong))
     assert figure is not None
     (axes,) = figure.axes
     assert len(axes.get_yticks()) > 1
