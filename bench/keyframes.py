@@ -27,7 +27,7 @@ from stsem.log.log import Loaded, open_log
 from stsem.metrics.confusion import confusion
 from stsem.metrics.scores import scores
 from stsem.replay.answer import AnswerRule, Prediction
-from stsem.replay.build import Model, build_model, policy_of, registering
+from stsem.replay.build import Model, build_model, policy_of, registering, settled
 from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTimes
 from stsem.stages import register
@@ -189,7 +189,7 @@ def measure(path: Path, given: argparse.Namespace) -> None:
     for name in given.logs:
         remember_what_no_keyframe_changes()
         with open_log([name]) as log:
-            model = build_model(log, RunConfig(model=given.model))
+            model = build_model(log, settled(log, RunConfig(model=given.model)))
             previous = model.network is not None and model.network.has_difference
             frames = list(log.frames(range(len(log.plans)), depth=True, previous=previous, truth=True))
             for method in given.methods.split(","):
