@@ -64,6 +64,7 @@ def test_what_nobody_can_tell(replay: Cli, home: Path, made_up_costs: Path) -> N
 
 def test_a_profile_says_whether_coverage_was_in_it(replay: Cli, home: Path, made_up_costs: Path) -> None:
     """Telling the coverage is a part of `register`; a profile without it is said to be foreign."""
-    assert replay(TINY, *COMMON, "--costs", made_up_costs, "--keyframes", "coverage").code == 0
+    assert replay(TINY, *COMMON, "--costs", made_up_costs, "--keyframes", "coverage",
+                  "--propagation", "homography").code == 0  # fmt: skip
     said = "but the run used homography (register: points and coverage)"
     assert any(said in warning for warning in report("r")["warnings"])
