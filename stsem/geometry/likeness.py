@@ -162,7 +162,7 @@ def described(view: View, image: Image) -> Cells:
     height, width = view.depth.shape
     if image.shape[:2] != (height, width):
         raise ValueError(f"the image {image.shape[:2]} must have the size of its depth {view.depth.shape}")
-    side = max(1, round(max(height, width) / CELLS))
+    side = max(1, min(round(max(height, width) / CELLS), height, width))
     rows, columns = height // side, width // side
     middle = np.s_[side // 2 :: side, side // 2 :: side]
     x, y = np.arange(columns) * side + side // 2, np.arange(rows) * side + side // 2

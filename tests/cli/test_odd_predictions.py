@@ -44,17 +44,11 @@ def test_slam_in_the_dark(replay: Cli, home: Path) -> None:
 
 
 @pytest.mark.parametrize("pose", ["log", "slam"])
-@pytest.mark.parametrize(
-    ("size", "methods"),
-    [((16, 12), METHODS), ((2000, 4), METHODS[:4]), ((1, 300), METHODS[:4])],
-    ids=["16x12", "2000x4", "1x300"],
-)
-def test_images_too_small_for_points(
-    replay: Cli, home: Path, size: tuple[int, int], methods: tuple[str, ...], pose: str
-) -> None:
+@pytest.mark.parametrize("size", [(16, 12), (2000, 4), (1, 300)], ids=["16x12", "2000x4", "1x300"])
+def test_images_too_small_for_points(replay: Cli, home: Path, size: tuple[int, int], pose: str) -> None:
     """No point has room in a strip; predictions without one hold the keyframe, and SLAM has depth at most."""
     log = write_walk(home / "small.mcap", size=size, frames=6)
-    for method in methods:
+    for method in METHODS:
         assert replay(log, *MODES, "--propagation", method, "--pose", pose, "--out", "r").code == 0
         assert all(run["offline"]["n"] == 6 for run in runs("r", 6))
 

@@ -81,7 +81,7 @@ class DepthWarp:
     def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
         """By depth where a keyframe saw the point; persons by flow; the rest by likeness."""
         by_flow, view = self._flow.predict(source, frame, registration), view_of(frame)
-        if view is None:
+        if view is None or not (view.depth > 0).any():
             return Predicted(by_flow.answer, source.index, NO_SPACE)
         rest = self._followed(by_flow.answer, source, view)
         seen = carry(view, [memory.source for memory in self._memory], rest, moving=self._moving)
