@@ -201,9 +201,11 @@ def test_depth_falls_back_to_flow_and_says_so(lacks: str) -> None:
     bare = replace(WALK[1][0], **{lacks: None})
     depth.see(bare)
     flow.see(bare)
-    found, wanted = depth.predict(source, bare), flow.predict(source, bare)
-    assert found.remark == NO_SPACE
-    np.testing.assert_array_equal(found.answer.labels, wanted.answer.labels)
+    unknown = replace(WALK[1][0], depth=np.full((HEIGHT, WIDTH), np.nan, np.float32))
+    for frame in (bare, unknown):
+        found, wanted = depth.predict(source, frame), flow.predict(source, frame)
+        assert found.remark == NO_SPACE
+        np.testing.assert_array_equal(found.answer.labels, wanted.answer.labels)
     other = Played(DepthWarp(CLASSES))
     blind = replace(WALK[0][0], **{lacks: None})
     other.see(blind)
