@@ -110,7 +110,9 @@ class DepthWarp:
             return self._flow.expected_coverage(frame, registration)
         rows = _spread(view.depth.size)
         known = rows[view.depth.reshape(-1)[rows] > 0]
-        return self._seen(view, known) / max(1, len(known))
+        if not len(known):
+            return self._flow.expected_coverage(frame, registration)
+        return self._seen(view, known) / len(known)
 
     def _seen(self, view: View, rows: Rows) -> int:
         """How many of the pixels `rows` a keyframe saw."""
