@@ -17,6 +17,8 @@ from stsem.stages.register import Registration
 
 KEPT = 32
 """Keyframes remembered: up to 9 bytes a pixel each, 152 MB in all at 960x540 with what they look like."""
+LIKENED = 16
+"""Of them, those whose points serve as examples: more give nothing, and the search tree of 32 takes 30 ms to build."""
 SAMPLES = 2048
 """Pixels by which the coverage of a frame is foretold."""
 FLOW_SIDE = 320
@@ -72,7 +74,7 @@ class DepthWarp:
         source = Source(view, answer.labels, answer.confidence).without(self._moving)
         new = _Memory(keyframe.stamp_ns, source, Examples.of(described(view, image), answer.labels))
         self._memory = tuple(sorted([new, *self._memory], key=lambda memory: -memory.stamp_ns)[:KEPT])
-        self._likeness = remembered([memory.examples for memory in self._memory])
+        self._likeness = remembered([memory.examples for memory in self._memory[:LIKENED]])
 
     def forgotten(self, index: int) -> None:
         """Its chain is let go; its depth and labels stay."""
