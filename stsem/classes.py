@@ -16,6 +16,7 @@ MAX_CLASSES = 255
 
 Colour = tuple[int, int, int]
 Labels = npt.NDArray[np.uint8]
+Bools = npt.NDArray[np.bool_]
 
 
 def normalised(name: str) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stsem.camera import Camera
-from stsem.classes import Labels
+from stsem.classes import Bools, Labels
 from stsem.pose import Pose
 from stsem.uncertainty import Confidence, Uncertainty
 
@@ -51,8 +51,11 @@ class Segmentation:
         labels: (H, W) uint8, NO_LABEL (255) where there is none.
         confidence: (H, W) float32 in 0..1, or None when the source states none.
         uncertainty: maps (H, W) of the network that made the labels; None where it gives none, or none was made.
+        covered: (H, W) bool, of labels that were predicted: a keyframe saw this point, so far as the method can tell;
+            None where nobody says, and for what came from a network.
     """
 
     labels: Labels
     confidence: Confidence | None = None
     uncertainty: Uncertainty | None = None
+    covered: Bools | None = None

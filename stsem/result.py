@@ -5,16 +5,17 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from struct import Struct
 
-from stsem.classes import Labels
+from stsem.classes import Bools, Labels
 from stsem.packed import Codes, Packed, packed_time, unpacked_time
 from stsem.uncertainty import Confidence, Uncertainty
 
-STAGES: tuple[str, ...] = ("decode", "register", "segment", "propagate", "fuse")
+STAGES: tuple[str, ...] = ("decode", "register", "segment", "propagate", "track", "fuse")
 """Every stage that can hold a core, in pipeline order: among jobs of one frame the earlier stage goes first, and
 tables, columns and pictures follow the same order. `decode` is a job only where `--count-decode` makes it one."""
 
-ANSWER_STAGES: tuple[str, ...] = tuple(stage for stage in STAGES if stage != "fuse")
-"""Stages between taking a frame and answering it; `fuse` works beside them. In pipeline order."""
+ANSWER_STAGES: tuple[str, ...] = tuple(stage for stage in STAGES if stage not in ("track", "fuse"))
+"""Stages between taking a frame and answering it; `track` and `fuse` work beside them. In pipeline order. Where the
+answer needs the pose that SLAM finds, `track` lies between, too."""
 
 
 class Outcome(StrEnum):
@@ -40,7 +41,7 @@ class Span:
 
     Args:
         frame: log index of the frame it worked for.
-        stage: one of `STAGES`; `decode` only where decoding is counted.
+        stage: one of `STAGES`; `decode` only where decoding is counted, `track` only where poses come from SLAM.
         cores: the cores it held, ascending.
         ready_ns: when it could have started.
         start_ns, end_ns: when it held its cores, half-open.
@@ -73,6 +74,9 @@ class FrameResult:
         labels: (H, W) uint8 in the log's classes; None without an answer.
         confidence: (H, W) float32 that goes with the labels; None where none is stated.
         uncertainty: maps (H, W) from the network; None where it gives none, and for answers that were predicted.
+        covered: (H, W) bool, the pixels of a predicted answer that rest on evidence; None where nobody says.
+        covered_share: the share of them, 0..1.
+        remark: what its prediction had to do without; "" otherwise.
     """
 
     index: int
@@ -88,6 +92,9 @@ class FrameResult:
     labels: Labels | None = None
     confidence: Confidence | None = None
     uncertainty: Uncertainty | None = None
+    covered: Bools | None = None
+    covered_share: float | None = None
+    remark: str = ""
 
 
 class Spans(Packed[Span]):
@@ -112,12 +119,13 @@ _OUTCOMES = tuple(Outcome)
 
 
 class Results(Packed[FrameResult]):
-    """What became of frames, without spans and images, in 53 bytes each."""
+    """What became of frames, without spans and images, in 65 bytes each."""
 
-    layout = Struct("<iqqqqbiid")
+    layout = Struct("<iqqqqbiiddi")
 
     def __init__(self, items: Iterable[FrameResult] = ()) -> None:
         self._reasons: Codes[str] = Codes()
+        self._remarks: Codes[str] = Codes()
         super().__init__(items)
 
     def _pack(self, item: FrameResult) -> tuple[float, ...]:
@@ -126,14 +134,16 @@ class Results(Packed[FrameResult]):
             packed_time(item.answered_ns), _OUTCOMES.index(item.outcome),
             -1 if item.keyframe is None else item.keyframe, self._reasons.code(item.reason),
             -1.0 if item.coverage is None else item.coverage,
+            -1.0 if item.covered_share is None else item.covered_share, self._remarks.code(item.remark),
         )  # fmt: skip
 
     def _unpack(
         self, index: int, stamp_ns: int, arrival_ns: int, taken_ns: int, answered_ns: int, outcome: int,
-        keyframe: int, reason: int, coverage: float,
+        keyframe: int, reason: int, coverage: float, covered_share: float, remark: int,
     ) -> FrameResult:  # fmt: skip
         return FrameResult(
             index, stamp_ns, unpacked_time(arrival_ns), unpacked_time(taken_ns), unpacked_time(answered_ns),
             _OUTCOMES[outcome], None if keyframe < 0 else keyframe, self._reasons.value(reason),
-            None if coverage < 0 else coverage,
+            None if coverage < 0 else coverage, covered_share=None if covered_share < 0 else covered_share,
+            remark=self._remarks.value(remark),
         )  # fmt: skip

@@ -47,7 +47,7 @@ def made_up_costs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cost profile in round numbers: the network takes about the period of `tiny_log`, the rest is quick."""
     samples = {
         "segment@2": (90, 100, 110, 120), "segment@1": (160, 180), "register@1": (8, 9), "propagate@1": (1, 2),
-        "fuse@1": (20,), "decode@1": (3,),
+        "fuse@1": (20,), "decode@1": (3,), "track@1": (30,),
     }  # fmt: skip
     profile = CostProfile("made up", {name: tuple(ms * 1_000_000 for ms in kept) for name, kept in samples.items()})
     path = tmp_path_factory.mktemp("costs") / "made-up.json"

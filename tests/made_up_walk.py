@@ -58,6 +58,8 @@ def write_walk(
     distortion: tuple[float, ...] = (),
     metadata: Mapping[str, Mapping[str, str]] | None = None,
     second_camera: bool = False,
+    dark: Callable[[int], bool] = lambda index: False,
+    pause_ns: int = 0,
 ) -> Path:
     """Write the log.
 
@@ -72,6 +74,8 @@ def write_walk(
         distortion: of the calibration.
         metadata: further records.
         second_camera: `/second/color` shows the same at the same stamps, inverted.
+        dark: which images are black.
+        pause_ns: how much later than its turn everything from the middle frame on comes.
     """
     width, height = size
     colours, labels = wall(width, height, frames)
@@ -82,12 +86,12 @@ def write_walk(
         if names is not None:
             log.writer.add_metadata("stsem.classes", {str(raw): name for raw, name in names.items()})
         for i in range(frames):
-            stamp = BASE_NS + i * PERIOD_NS
+            stamp = BASE_NS + i * PERIOD_NS + pause_ns * (i >= frames // 2)
             log.add("/camera/calibration", _calibration(stamp, size, distortion), stamp + 1_000_000)
             if poses:
                 log.add("/pose", _pose(stamp, 0.01 * i), stamp + DELAYS_NS["pose"])
             window = np.s_[:, SHIFT * i : SHIFT * i + width]
-            color = _image(stamp, colours[window], "rgb8", 3 * width, cut=i in broken)
+            color = _image(stamp, colours[window] * (not dark(i)), "rgb8", 3 * width, cut=i in broken)
             log.add("/camera/color", color, stamp + DELAYS_NS["color"])
             if second_camera:
                 inverted = _image(stamp, 255 - colours[window], "rgb8", 3 * width)

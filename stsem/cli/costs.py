@@ -17,7 +17,7 @@ def measure(
     log: Annotated[str, typer.Argument(metavar="LOG", help="MCAP file, folder or address.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Where the profile goes.")],
     model: Annotated[str, typer.Option("--model", metavar="NAME|ONNX", help="The network.")] = "default",
-    propagation: Annotated[str, typer.Option("--propagation", help="The method between keyframes.")] = "homography",
+    propagation: Annotated[str, typer.Option("--propagation", help="The method between keyframes.")] = "auto",
     backend: Annotated[
         str, typer.Option("--backend", help="What runs the network: onnxruntime or openvino.")
     ] = "onnxruntime",
@@ -28,19 +28,20 @@ def measure(
     """Write a profile with the network on one and on two cores."""
     from stsem.cli.console import note
     from stsem.log.log import open_log
-    from stsem.replay.build import build_model
+    from stsem.replay.build import build_model, needed_roles, settled
     from stsem.replay.calibrate import measure as calibrate
     from stsem.replay.costing import calibration_frames, subject
-    from stsem.replay.engine import can_map
+    from stsem.replay.posing import can_map, can_track
     from stsem.replay.settings import validated
 
     config = validated(
         {"model": model, "propagation": propagation, "backend": backend, "precision": precision, "count_decode": True}
     )
     with open_log([log]) as opened:
+        config = settled(opened, config)
         built, fused = build_model(opened, config), can_map(opened, config)
-        frames = calibration_frames(opened, built.needs(fused=fused))
-        wanted = subject(opened, config, built, cores=(1, 2), fused=fused)
+        frames = calibration_frames(opened, needed_roles(built, config, fused=fused))
+        wanted = subject(opened, config, built, cores=(1, 2), fused=fused, track=can_track(opened))
         profile = calibrate(wanted, frames, samples=samples, limit_ns=round(seconds * 1e9))
     profile.save(out)
     for stage, times in profile.samples_ns.items():

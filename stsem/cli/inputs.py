@@ -5,22 +5,19 @@ from collections.abc import Iterator
 from operator import attrgetter
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from stsem.cli.rows import RunRows
 from stsem.document.schema import Document
-from stsem.log.log import Log
 from stsem.mapping.ply import write_ply
+from stsem.metrics.tum import HEADER, lines
 from stsem.packed import IntByIndex
-from stsem.pose import Trajectory, to_quaternion
+from stsem.pose import Trajectory
 from stsem.replay.engine import Replayed
 from stsem.replay.runs import Context
+from stsem.replay.trajectories import side_by_side, trajectories
 from stsem.report.annotated import AnnotatedLog
 from stsem.report.inputs import ReportInputs, StripFrame, UnsureFrame
 from stsem.sim.trace import Marks, RunTrace, write_trace
 
-MAX_POSE_GAP_NS = 150_000_000
 BLOCK_STAMPS = 1_000
 _INDEX = attrgetter("index")
 
@@ -29,6 +26,7 @@ def report_inputs(context: Context, document: Document, scratch: Path, *, plots:
     """What `write_folder` needs; the map is written to `scratch` first."""
     replayed = context.replayed
     clocked = any(run.real_time is not None for run in replayed.runs)
+    poses = trajectories(context.log, replayed.posing, replayed.runs[-1].tracker)
     return ReportInputs(
         document=document,
         frames={run.mode.name: RunRows(run, replayed) for run in replayed.runs},
@@ -36,7 +34,8 @@ def report_inputs(context: Context, document: Document, scratch: Path, *, plots:
         strip_pass="offline" if any(run.offline is not None for run in replayed.runs) else "delivered",
         unsure=_unsure(replayed),
         trace=(lambda path: write_trace(path, _traces(context))) if clocked else None,
-        trajectory=None if context.log.trajectory is None else _trajectory(context.log.trajectory, context.log),
+        trajectory=None if poses.used is None else _text(poses.used),
+        paths=side_by_side(poses),
         point_cloud=_map(context, scratch),
         plots=plots,
     )
@@ -86,22 +85,12 @@ def _traces(context: Context) -> Iterator[RunTrace]:
             yield RunTrace(run.mode.name, context.config.cores, stamps, run.spans, marks)
 
 
-def _trajectory(trajectory: Trajectory, log: Log) -> Iterator[bytes]:
-    """Camera poses at the colour stamps, TUM format: stamp in seconds, position, quaternion x y z w."""
-    stamps = np.fromiter((plan.stamp_ns for plan in log.plans), np.int64, len(log.plans))
-    yield b"# timestamp tx ty tz qx qy qz qw\n"
-    for begin in range(0, len(stamps), BLOCK_STAMPS):
-        yield "".join(_trajectory_lines(trajectory, stamps[begin : begin + BLOCK_STAMPS])).encode()
-
-
-def _trajectory_lines(trajectory: Trajectory, stamps_ns: npt.NDArray[np.int64]) -> Iterator[str]:
-    found = trajectory.brackets(stamps_ns, MAX_POSE_GAP_NS)
-    known = stamps_ns[found.known]
-    poses = trajectory.between(known, found.earlier[found.known], found.later[found.known])
-    numbers = np.concatenate([poses[:, :3, 3], to_quaternion(poses)], axis=1)
-    for stamp_ns, row in zip(known.tolist(), numbers.tolist(), strict=True):
-        seconds, rest = divmod(stamp_ns, 10**9)
-        yield f"{seconds}.{rest:09d} " + " ".join(f"{number:.9g}" for number in row) + "\n"
+def _text(trajectory: Trajectory) -> Iterator[bytes]:
+    """Camera poses at the colour stamps, TUM format."""
+    yield HEADER.encode()
+    for begin in range(0, len(trajectory), BLOCK_STAMPS):
+        block = slice(begin, begin + BLOCK_STAMPS)
+        yield "".join(lines(trajectory.stamps_ns[block], trajectory.poses[block])).encode()
 
 
 def _map(context: Context, scratch: Path) -> Path | None:

@@ -26,7 +26,8 @@ def replay(
         list[str], typer.Argument(metavar="LOG...", help="MCAP files, folders of one recording, https:// or s3://.")
     ],
     mode: Annotated[
-        str | None, option("--mode", panel=_PIPELINE, metavar="MODE,...", help="per-frame, keyframe, both. [both]")
+        str | None,
+        option("--mode", panel=_PIPELINE, metavar="MODE,...", help="per-frame, keyframe, keyframe-async, both. [both]"),
     ] = None,
     model: Annotated[
         str | None,
@@ -40,12 +41,26 @@ def replay(
         str | None, option("--precision", panel=_PIPELINE, help="f32, int8 or (openvino only) bf16. [f32]")
     ] = None,
     keyframes: Annotated[
-        str | None, option("--keyframes", panel=_PIPELINE, metavar="POLICY", help="paper or every:N. [paper]")
+        str | None,
+        option(
+            "--keyframes",
+            panel=_PIPELINE,
+            metavar="POLICY",
+            help="paper, every:N, coverage:SHARE, budget:HZ. [paper]",
+        ),
     ] = None,
     propagation: Annotated[
-        str | None, option("--propagation", panel=_PIPELINE, metavar="METHOD", help="hold or homography. [homography]")
+        str | None,
+        option(
+            "--propagation",
+            panel=_PIPELINE,
+            metavar="METHOD",
+            help="auto, hold, homography, homography-chained, flow, depth. [auto]",
+        ),
     ] = None,
-    pose: Annotated[str | None, option("--pose", panel=_PIPELINE, help="Where poses come from: log. [log]")] = None,
+    pose: Annotated[
+        str | None, option("--pose", panel=_PIPELINE, metavar="log|slam", help="Where poses come from. [log]")
+    ] = None,
     map_: Annotated[str | None, option("--map", panel=_PIPELINE, metavar="on|off", help="Labelled map. [on]")] = None,
     depth_registered: Annotated[
         str | None,

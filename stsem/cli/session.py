@@ -22,11 +22,12 @@ from stsem.log.container.source import shown_name, without_secrets
 from stsem.log.describe import log_name
 from stsem.log.log import Log, open_log
 from stsem.plain import MAX_SENTENCE, plain
-from stsem.replay.build import Model, build_model, truth_frames
+from stsem.replay.build import Model, build_model, needed_roles, settled, truth_frames
 from stsem.replay.config import RunConfig
 from stsem.replay.costing import Costing, costing
 from stsem.replay.documents import build_document
-from stsem.replay.engine import can_map, replay_log
+from stsem.replay.engine import replay_log
+from stsem.replay.posing import can_map
 from stsem.replay.runs import Context
 from stsem.replay.timing import deadline_ns
 from stsem.report.annotated import AnnotatedLog
@@ -34,6 +35,7 @@ from stsem.report.folder import check_target, folder_name, write_folder
 from stsem.report.terminal import closing_table
 from stsem.search.probe import Probe
 from stsem.search.sustainable import Sustainable, search
+from stsem.stages.track import Tracker
 
 REPORTS = Path("reports")
 
@@ -109,7 +111,7 @@ def _replay_one(paths: tuple[str, ...], config: RunConfig, out: Path | None) -> 
             start_s=config.start, end_s=config.end, progress=step,
         )  # fmt: skip
     with log:
-        session = _session(log, config)
+        session = _session(log, settled(log, config))
         document, folder = _write(session, out, began)
         for number in range(2, config.repeat + 1):
             _check_repeats(session, folder, number)
@@ -130,7 +132,7 @@ def _replay(session: Session, annotated: AnnotatedLog | None) -> Context:
     watch = None if annotated is None else lambda mode, result, frame: annotated.answer(mode.name, result, frame)
     with progress(f"Replaying {log.info.name}") as step:
         replayed = replay_log(log, config, model, None if costs is None else costs.of, step, watch)
-    rates = _sustainable(session)
+    rates = _sustainable(session, replayed.runs[0].tracker)
     notes = tuple(
         f"{mode} sustains {found.hz:g} Hz, the highest rate tried; it may sustain more."
         for mode, found in rates.items()
@@ -139,15 +141,16 @@ def _replay(session: Session, annotated: AnnotatedLog | None) -> Context:
     return Context(log, config, model, costs, replayed, {mode: found.hz for mode, found in rates.items()}, notes)
 
 
-def _sustainable(session: Session) -> dict[str, Sustainable]:
+def _sustainable(session: Session, tracker: Tracker | None) -> dict[str, Sustainable]:
     """Mode -> the highest rate it sustains, in frames per second, where that was asked for."""
     log, config, costs = session.log, session.config, session.costing
     if not config.sustainable or costs is None:
         return {}
     usable = truth_frames(log) if config.is_oracle else None
     deadline = deadline_ns(config.deadline_ms, log.period_ns, Fraction(1))
-    needs = session.model.needs(fused=session.fused)
-    probe = Probe(log, config, costs.of, needs=needs, fused=session.fused, usable=usable, patience_ns=deadline)
+    needs = needed_roles(session.model, config, fused=session.fused)
+    probe = Probe(log, config, costs.of, needs=needs, fused=session.fused, usable=usable, tracker=tracker,
+                  patience_ns=deadline)  # fmt: skip
     return {
         mode.name: search(partial(probe.attempt, mode), capture_hz=1e9 / log.period_ns, deadline_ns=deadline)
         for mode in config.modes

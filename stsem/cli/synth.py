@@ -23,7 +23,9 @@ def synth(
     rate: Annotated[float, typer.Option("--rate", metavar="HZ", help="Frames per second.")] = 10.0,
     seconds: Annotated[float, typer.Option("--seconds", metavar="S", help="Length.")] = 15.0,
     noise: Annotated[str, typer.Option("--noise", help="Depth noise: kinect or none.")] = "kinect",
-    speed: Annotated[str, typer.Option("--speed", help="steady (0.5 m/s) or varying (pauses, fast turns).")] = "steady",
+    speed: Annotated[
+        str, typer.Option("--speed", help="steady (0.5 m/s), searching (looks about) or varying (pauses, fast turns).")
+    ] = "steady",
     label_every: Annotated[int, typer.Option("--label-every", metavar="N", help="Truth for every Nth frame.")] = 1,
 ) -> int:
     """Same options, same bytes."""

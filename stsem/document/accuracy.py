@@ -65,18 +65,24 @@ class Loss(Part):
 
 
 class DistanceRow(Part):
-    """Accuracy of the frames at one distance from their keyframe; offline pass."""
+    """Accuracy of the frames at one distance from their keyframe."""
 
     frames: Count
     """Distance to the keyframe as a difference of log indices; 0 is the keyframe itself."""
     ms: Number = None
-    """Median distance to the keyframe in milliseconds of capture time."""
+    """Mean time since the keyframe over these frames, milliseconds of capture time."""
     miou: Share = None
     """mIoU of the frames at this distance, as in `Score`. Fraction."""
     pixel_accuracy: Share = None
     """Pixel accuracy of the frames at this distance. Fraction."""
     n: Count = 0
     """Scored frames at this distance."""
+    covered: Share = None
+    """Share of the scored pixels that rest on evidence; null where the method does not say. Fraction."""
+    covered_miou: Share = None
+    """mIoU over those pixels alone. Fraction."""
+    covered_pixel_accuracy: Share = None
+    """Pixel accuracy over those pixels alone. Fraction."""
 
 
 class DistanceSummary(Part):

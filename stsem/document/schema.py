@@ -8,32 +8,17 @@ from typing import Literal, Self
 from pydantic import Field, JsonValue, model_validator
 
 from stsem.document.accuracy import Consistency, Coverage, DistanceRow, DistanceSummary, Loss, Score
+from stsem.document.background import Background
 from stsem.document.calibration import Calibration, ErrorDetection
 from stsem.document.origin import Host, Identity, Input
 from stsem.document.part import Count, Number, Part, Share
 from stsem.document.timing import Latency, Outcomes, Throughput
+from stsem.document.trajectory import TrajectoryScore
 
 SCHEMA_VERSION: Literal[1] = 1
 
 State = Literal["valid", "lossy", "invalid"]
 AccuracyState = Literal["measured", "not measured"]
-
-
-class TrajectoryScore(Part):
-    """How good the poses are that the run used."""
-
-    pose: str = "log"
-    """Where the poses come from: `log` or `slam`."""
-    tracked_share: Share = None
-    """Frames with a pose over all frames. Fraction."""
-    ate_rmse_m: Number = None
-    """Root mean square of the position error after rigid alignment, metres."""
-    rpe_translation_m: Number = None
-    """Root mean square translation error over one second, metres."""
-    rpe_rotation_deg: Number = None
-    """Root mean square rotation error over one second, degrees."""
-    n: Count = 0
-    """Poses compared."""
 
 
 class MapScore(Part):
@@ -74,6 +59,15 @@ class Run(Part):
     """Log indices of the frames that went through the network."""
     keyframe_reasons: dict[str, Count] = Field(default_factory=dict)
     """Why frames became keyframes -> how many."""
+    background: Background | None = None
+    """What became of the frames that the network was to label beside the answers, and how old the answers were; null in
+    modes whose answers wait for the network, and without a clock."""
+    covered: Share = None
+    """Mean over the predicted answers of the share of pixels that rest on evidence: a keyframe saw the point, so far as
+    the method can tell. Of the real-time run; offline where that is the only pass. null where the method does not
+    say. Fraction."""
+    remarks: dict[str, Count] = Field(default_factory=dict)
+    """What the prediction had to do without, for how many frames; of the same pass as `covered`."""
     keyframes_moved: Count = 0
     """Oracle only: choices moved to the next frame that has truth."""
     stages_inside: tuple[str, ...] = ()
@@ -91,7 +85,8 @@ class Run(Part):
     loss: Loss | None = None
     """Where mIoU is lost on the way from 1 to the streaming score."""
     strata: dict[str, Score] = Field(default_factory=dict)
-    """Offline scores of parts of the frames: `segmented`, `propagated`."""
+    """Offline scores of parts of the frames: `segmented`, `propagated`; `covered`: the pixels of the latter that rest
+    on evidence."""
     by_distance: tuple[DistanceRow, ...] = ()
     """Offline accuracy by distance to the keyframe, ascending."""
     by_distance_summary: DistanceSummary | None = None
@@ -118,6 +113,11 @@ class Run(Part):
         if self.outcomes.total != self.frames:
             raise ValueError(
                 f"the outcomes of {self.mode} sum to {self.outcomes.total}, but there are {self.frames} frames"
+            )
+        if self.background is not None and self.background.finished != len(self.keyframes):
+            raise ValueError(
+                f"{self.background.finished} frames of {self.mode} were finished in the background, but there are "
+                f"{len(self.keyframes)} keyframes"
             )
         return self
 

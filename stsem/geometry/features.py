@@ -11,6 +11,8 @@ from stsem.frame import Image
 
 WORKING_SIDE = 256
 """Longer side, in pixels, of the image in which points are sought, whatever size came (docs/decisions.md has why)."""
+MARGIN = 16
+"""No point is nearer to the border of that image, in pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,9 @@ class Features:
 
 
 def extract(image: Image, *, max_features: int = 1000) -> Features:
-    """ORB points of `image`; none in an image without texture. Repeats to the bit, whatever the number of threads.
+    """ORB points of `image`; none in an image without texture, or far longer than wide.
+
+    Repeats to the bit, whatever the number of threads.
 
     Args:
         image: (H, W, 3) uint8 RGB.
@@ -50,9 +54,12 @@ def extract(image: Image, *, max_features: int = 1000) -> Features:
     grey = cv2.resize(
         cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
     )
+    none = Features(np.empty((0, 2), np.float32), np.empty((0, 32), np.uint8), width, height)
+    if min(size) <= 2 * MARGIN:  # OpenCV would fail on the pyramid of an image a few pixels wide
+        return none
     keypoints, descriptors = _detector(max_features).detectAndCompute(grey, None)
     if descriptors is None or not keypoints:
-        return Features(np.empty((0, 2), np.float32), np.empty((0, 32), np.uint8), width, height)
+        return none
     grain = np.array([width / size[0], height / size[1]], np.float32)
     xy = (np.array([keypoint.pt for keypoint in keypoints], np.float32) + 0.5) * grain - 0.5
     return Features(xy, descriptors.astype(np.uint8, copy=False), width, height)
@@ -61,4 +68,4 @@ def extract(image: Image, *, max_features: int = 1000) -> Features:
 @lru_cache(maxsize=4)
 def _detector(max_features: int) -> cv2.ORB:
     """Points down to a weak corner (7 of 255) and up to 16 pixels from the border: indoor walls offer little else."""
-    return cv2.ORB.create(nfeatures=max_features, edgeThreshold=16, fastThreshold=7)
+    return cv2.ORB.create(nfeatures=max_features, edgeThreshold=MARGIN, fastThreshold=7)

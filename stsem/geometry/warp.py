@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from stsem.classes import NO_LABEL, Labels
+from stsem.classes import NO_LABEL, Bools, Labels
 from stsem.geometry.homography import Matrix3
 from stsem.uncertainty import Confidence
 
@@ -31,13 +31,16 @@ def warp_confidence(confidence: Confidence, H: Matrix3, size: tuple[int, int]) -
     return np.asarray(warped, np.float32)
 
 
-def warp_onto(background: npt.NDArray[Value], labels: npt.NDArray[Value], H: Matrix3) -> npt.NDArray[Value]:
-    """`warp_labels` with the labels of `background` (H, W), which is left as it is, where the keyframe does not reach.
+def warp_covered(shape: tuple[int, ...], H: Matrix3, size: tuple[int, int]) -> Bools:
+    """(H, W) bool for an image of `size` (width, height): where a keyframe of `shape` (H, W) reaches."""
+    warped = cv2.warpPerspective(np.ones(shape, np.uint8), H, size, flags=cv2.INTER_NEAREST, borderValue=0)
+    return np.asarray(warped, np.uint8).view(np.bool_)
 
-    A pixel for which the keyframe has NO_LABEL gets NO_LABEL: it was reached. Confidence is moved likewise.
+
+def warp_extended(values: npt.NDArray[Value], H: Matrix3, size: tuple[int, int]) -> npt.NDArray[Value]:
+    """Labels or confidence as `warp_labels` moves them; where the keyframe does not reach, those of its nearest border.
+
+    A pixel for which the keyframe has NO_LABEL gets NO_LABEL.
     """
-    height, width = background.shape
-    warped = cv2.warpPerspective(
-        labels, H, (width, height), dst=background.copy(), flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_TRANSPARENT
-    )
-    return np.asarray(warped, background.dtype)
+    warped = cv2.warpPerspective(values, H, size, flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(warped, values.dtype)

@@ -39,6 +39,10 @@ class LabelledPoints:
         """The points at `rows`, in that order."""
         return LabelledPoints(self.xyz[rows], self.rgb.take(rows, axis=0), self.labels[rows])
 
+    def part(self, rows: slice) -> "LabelledPoints":
+        """The points of `rows`, which shares their memory."""
+        return LabelledPoints(self.xyz[rows], self.rgb[rows], self.labels[rows])
+
 
 def backproject(
     depth: Depth, labels: Labels, image: Image, camera: Camera, T_WC: Pose, *, max_depth_m: float = 10.0

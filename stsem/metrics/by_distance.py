@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -24,6 +24,8 @@ class DistanceRow:
         miou, pixel_accuracy: fractions; NaN without truth pixels.
         classes_averaged: in `miou`: classes with truth pixels at this distance.
         n: frames.
+        covered: share of their judged pixels that rest on evidence; None where no prediction says.
+        covered_miou, covered_pixel_accuracy: over those pixels alone; None likewise, NaN without any.
     """
 
     frames: int
@@ -32,6 +34,9 @@ class DistanceRow:
     pixel_accuracy: float
     classes_averaged: int
     n: int
+    covered: float | None = None
+    covered_miou: float | None = None
+    covered_pixel_accuracy: float | None = None
 
 
 @dataclass(frozen=True)
@@ -86,18 +91,42 @@ class ByDistance:
     def __init__(self, classes: int) -> None:
         self._zero = np.zeros((3, classes), np.int64)
         self._sums: dict[int, Tally] = {}
+        self._covered: dict[int, Tally] = {}
+        self._told: dict[int, Tally] = {}
         self._time_ns: Counter[int] = Counter()
         self._frames: Counter[int] = Counter()
 
-    def update(self, distance: int, distance_ns: int, matrix: npt.NDArray[np.int64]) -> None:
-        """Add the matrix (C, C + 1) of one frame at `distance` frames and `distance_ns` from its keyframe."""
-        self._sums[distance] = self._sums.get(distance, self._zero) + tally(matrix)
+    def update(
+        self, distance: int, distance_ns: int, matrix: npt.NDArray[np.int64],
+        covered: npt.NDArray[np.int64] | None = None,
+    ) -> None:  # fmt: skip
+        """Add one frame at `distance` frames and `distance_ns` from its keyframe.
+
+        Args:
+            distance, distance_ns: log indices and capture time.
+            matrix: (C, C + 1) of the frame.
+            covered: (C, C + 1) of its covered pixels alone; None if its answer does not say which they are.
+        """
+        counts = tally(matrix)
+        self._sums[distance] = self._sums.get(distance, self._zero) + counts
+        if covered is not None:
+            self._covered[distance] = self._covered.get(distance, self._zero) + tally(covered)
+            self._told[distance] = self._told.get(distance, self._zero) + counts
         self._time_ns[distance] += distance_ns
         self._frames[distance] += 1
 
     def compute(self) -> tuple[DistanceRow, ...]:
         """Rows by ascending distance."""
-        return tuple(_row(d, self._time_ns[d], self._frames[d], self._sums[d]) for d in sorted(self._sums))
+        return tuple(self._covered_row(d) for d in sorted(self._sums))
+
+    def _covered_row(self, distance: int) -> DistanceRow:
+        row = _row(distance, self._time_ns[distance], self._frames[distance], self._sums[distance])
+        if distance not in self._covered:
+            return row
+        covered, pixels = self._covered[distance], int(self._told[distance][1].sum())
+        there = scores_of_tally(covered)
+        share = int(covered[1].sum()) / pixels if pixels else float("nan")
+        return replace(row, covered=share, covered_miou=there.miou, covered_pixel_accuracy=there.pixel_accuracy)
 
 
 def _row(distance: int, time_ns: int, n: int, counts: Tally) -> DistanceRow:

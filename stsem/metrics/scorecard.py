@@ -7,15 +7,17 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from stsem.classes import ClassSet, Labels
+from stsem.classes import NO_LABEL, Bools, ClassSet, Labels
 from stsem.metrics.accumulate import FrameTallies, FrameValues, IndexSet, Judged, Samples, Total
 from stsem.metrics.by_distance import ByDistance, DistanceRow, DistanceSummary, summarise
-from stsem.metrics.confusion import confusion
+from stsem.metrics.confusion import Matrix, confusion, resized
 from stsem.metrics.durations import Durations, Summary
 from stsem.metrics.scores import tally
 from stsem.result import Outcome
 
 STRATA = (Outcome.SEGMENTED, Outcome.PROPAGATED)
+COVERED = "covered"
+"""The stratum of those pixels of predicted answers that rest on evidence."""
 
 SCORED = (Outcome.SEGMENTED, Outcome.PROPAGATED, Outcome.NO_SOURCE)
 """Outcomes that the offline and the delivered score contain: the mode answered, if only with "no label"."""
@@ -29,7 +31,8 @@ class Accuracy:
         own: answers against their own frames: the `offline` or the `delivered` score; None: nothing was answered.
         streaming: at every truth frame's arrival, the newest finished answer against that frame; None: not measured.
         age: of those newest answers, milliseconds: arrival of the truth frame - stamp of the answer used.
-        strata: `own` of the segmented and of the propagated frames; a stratum without frames is absent.
+        strata: `own` of the segmented and of the propagated frames, and of the covered pixels of the latter; a stratum
+            without frames is absent.
         by_distance: by distance to the keyframe (reported for the offline pass only).
         distance_summary: mean and minimum over the distances with enough frames; None without any.
         unknown: names of classes with truth pixels that the network does not know; they count as wrong.
@@ -70,7 +73,7 @@ class Scorecard:
             raise ValueError(f"`known` of shape {known.shape} does not fit {len(classes)} classes")
         self._classes, self._known = classes, known
         self._own, self._streaming = self._total(), self._total()
-        self._strata = {outcome: self._total() for outcome in STRATA}
+        self._strata = {str(stratum): self._total() for stratum in (*STRATA, COVERED)}
         self._frames, self._instants = FrameTallies(len(classes)), FrameTallies(len(classes))
         self._scored = IndexSet()
         self._distances = ByDistance(len(classes))
@@ -91,6 +94,7 @@ class Scorecard:
         outcome: Outcome,
         distance: int | None,
         distance_ns: int | None,
+        covered: Bools | None = None,
     ) -> None:
         """Judge an answer against its own frame (offline, or as delivered): once for EVERY frame with truth.
 
@@ -104,6 +108,7 @@ class Scorecard:
             answer: (h, w) uint8; None when the frame got no answer.
             outcome: how the answer was made, or why there is none.
             distance, distance_ns: to the keyframe that the answer comes from, in log indices and stamps; or None.
+            covered: (h, w) bool, the pixels of a predicted answer that rest on evidence; None where nobody says.
 
         Raises:
             ValueError: the frame was judged before, or an image is not a label image.
@@ -113,10 +118,13 @@ class Scorecard:
         if outcome in SCORED:
             self._own.update(matrix, missed=answer is None)
             self._scored.add(index)
-        if outcome in self._strata:
+        if outcome in STRATA:
             self._strata[outcome].update(matrix, missed=answer is None)
+        there = None if answer is None or covered is None else self._where(covered, truth, answer)
+        if there is not None:
+            self._strata[COVERED].update(there, missed=False)
         if answer is not None and distance is not None and distance_ns is not None:
-            self._distances.update(distance, distance_ns, matrix)
+            self._distances.update(distance, distance_ns, matrix, there)
 
     def judge_streaming(self, index: int, truth: Labels, answer: Labels | None, *, age_ns: int | None) -> None:
         """Judge, at the arrival of frame `index`, the finished answer with the newest stamp against THIS frame's truth.
@@ -146,7 +154,7 @@ class Scorecard:
         if reason:
             return Accuracy(None, None, None, {}, (), None, unknown, reason)
         rows = self._distances.compute()
-        strata = {str(outcome): found for outcome, kept in self._strata.items() if (found := kept.compute())}
+        strata = {stratum: found for stratum, kept in self._strata.items() if (found := kept.compute())}
         return Accuracy(
             own=own,
             streaming=streaming,
@@ -184,6 +192,12 @@ class Scorecard:
         """The same for the streaming judgement."""
         found = self._instants.compute()
         return FrameValues(found.index, found.pixel_accuracy)
+
+    def _where(self, covered: Bools, truth: Labels, answer: Labels) -> Matrix:
+        """The matrix of the `covered` pixels alone."""
+        height, width = truth.shape
+        seen = resized(covered.view(np.uint8), width, height).view(np.bool_)
+        return confusion(np.where(seen, truth, np.uint8(NO_LABEL)), answer, len(self._classes))
 
     def _total(self) -> Total:
         return Total(len(self._classes), self._known)

@@ -1,17 +1,23 @@
 """Trajectory errors as evo and the TUM RGB-D benchmark define them (Sturm et al. 2012)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from stsem.pose import Pose, inverse
+from stsem.pose import Pose, Trajectory, inverse
+
+_T = TypeVar("_T")
 
 Poses = npt.NDArray[np.float64]
 """(n, 4, 4) float64, T_WC."""
 
 MIN_POSES = 3
+
+MAX_DIFFERENCE_NS = 20_000_000
+"""Stamps of an estimated and a true pose farther apart do not match (the TUM RGB-D benchmark's 20 ms)."""
 
 
 @dataclass(frozen=True)
@@ -108,11 +114,53 @@ def relative_errors(estimate: Poses, truth: Poses, delta: int = 1) -> RelativeEr
     starts = np.arange(0, len(truth) - delta, delta) if delta > 0 else np.zeros(0, np.int64)
     if len(starts) == 0:
         raise ValueError(f"{len(truth)} poses have no pair that is {delta} apart")
-    errors = np.stack([_relative(estimate[i], estimate[i + delta], truth[i], truth[i + delta]) for i in starts])
-    return RelativeErrors(
-        translation_m=statistics(np.linalg.norm(errors[:, :3, 3], axis=1)),
-        rotation_deg=statistics(np.degrees([rotation_angle(error) for error in errors])),
-    )
+    return _errors_of_pairs(estimate, truth, starts, starts + delta)
+
+
+def relative_errors_per_metre(estimate: Poses, truth: Poses, metres: float = 1.0) -> RelativeErrors:
+    """RPE over all pairs that are `metres` apart along the true path, see `pairs_apart`.
+
+    Equal to evo's with all pairs, taken from the reference.
+
+    Raises:
+        ValueError: there is no pair.
+    """
+    steps = np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1)
+    first, second = pairs_apart(np.concatenate([[0.0], np.cumsum(steps)]), metres)
+    return _errors_of_pairs(estimate, truth, first, second)
+
+
+def relative_errors_per_second(
+    stamps_ns: npt.NDArray[np.int64], estimate: Poses, truth: Poses, seconds: float = 1.0
+) -> RelativeErrors:
+    """RPE over all pairs of poses that are `seconds` apart to within 5 % by their stamps (n,); see `pairs_apart`.
+
+    Raises:
+        ValueError: there is no pair.
+    """
+    since_first = (stamps_ns - stamps_ns[:1]).astype(np.float64)
+    first, second = pairs_apart(since_first, seconds * 1e9, tolerance=0.05)
+    return _errors_of_pairs(estimate, truth, first, second)
+
+
+def pairs_apart(
+    progress: npt.NDArray[np.float64], delta: float, tolerance: float = 0.1
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Rows (i, j), j > i, of all pairs that are `delta` apart in `progress` (n,), which never falls.
+
+    For every i that j whose distance from i comes closest to `delta`, the first of equals; the pair counts if it is
+    `delta` to within `tolerance` as a share of it (evo's rule for all pairs).
+    """
+    rows = np.arange(max(len(progress) - 1, 0))
+    if len(rows) == 0:
+        return rows, rows
+    after = np.searchsorted(progress, progress[:-1] + delta).clip(rows + 1, len(rows))
+    before = np.maximum(np.searchsorted(progress, progress[np.maximum(after - 1, rows + 1)]), rows + 1)
+    off_before = np.abs(progress[before] - progress[:-1] - delta)
+    off_after = np.abs(progress[after] - progress[:-1] - delta)
+    nearest = np.where(off_before <= off_after, before, after)
+    kept = np.minimum(off_before, off_after) <= tolerance * delta
+    return rows[kept], nearest[kept]
 
 
 def rotation_angle(pose: Pose) -> float:
@@ -136,6 +184,42 @@ def statistics(errors: npt.NDArray[np.float64]) -> Errors:
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class TrajectoryAccuracy:
+    """How good an estimated trajectory is; None where it cannot be told.
+
+    Args:
+        ate: absolute errors in metres, aligned without scale.
+        per_metre, per_second: relative errors over 1 m of the true path, and over 1 s.
+        matched: poses that have a true one.
+    """
+
+    ate: Errors | None
+    per_metre: RelativeErrors | None
+    per_second: RelativeErrors | None
+    matched: int
+
+
+def accuracy(
+    estimate: Trajectory, truth: Trajectory, *, max_difference_ns: int = MAX_DIFFERENCE_NS
+) -> TrajectoryAccuracy:
+    """Judge an estimate against the truth, poses matched by `associate`.
+
+    Args:
+        estimate: a pose for each frame that was tracked, none for one that was not.
+        truth: in any other world frame.
+        max_difference_ns: stamps farther apart do not match.
+    """
+    rows, true_rows = associate(estimate.stamps_ns, truth.stamps_ns, max_difference_ns)
+    found, wanted, stamps_ns = estimate.poses[rows], truth.poses[true_rows], estimate.stamps_ns[rows]
+    return TrajectoryAccuracy(
+        ate=_unless_refused(lambda: absolute_errors(found, wanted)),
+        per_metre=_unless_refused(lambda: relative_errors_per_metre(found, wanted)),
+        per_second=_unless_refused(lambda: relative_errors_per_second(stamps_ns, found, wanted)),
+        matched=len(rows),
+    )
+
+
 class TrajectoryMeter:
     """Accumulates matched poses of an estimated and a true trajectory."""
 
@@ -153,12 +237,29 @@ class TrajectoryMeter:
 
     def compute(self) -> Errors | None:
         """ATE so far; None while the poses cannot be aligned."""
-        try:
-            return absolute_errors(np.array(self._estimate).reshape(-1, 4, 4), np.array(self._truth).reshape(-1, 4, 4))
-        except ValueError:
-            return None
+        found, wanted = (np.array(poses).reshape(-1, 4, 4) for poses in (self._estimate, self._truth))
+        return _unless_refused(lambda: absolute_errors(found, wanted))
 
 
-def _relative(estimate_a: Pose, estimate_b: Pose, truth_a: Pose, truth_b: Pose) -> Pose:
-    moved: Pose = inverse(inverse(truth_a) @ truth_b) @ (inverse(estimate_a) @ estimate_b)
-    return moved
+def _unless_refused(measure: Callable[[], _T]) -> _T | None:
+    """What `measure` gives; None where it says that there is too little to measure."""
+    try:
+        return measure()
+    except ValueError:
+        return None
+
+
+def _errors_of_pairs(
+    estimate: Poses, truth: Poses, first: npt.NDArray[np.int64], second: npt.NDArray[np.int64]
+) -> RelativeErrors:
+    """Of pairs given by their rows (m,).
+
+    Raises:
+        ValueError: there is none.
+    """
+    true_motion = inverse(truth[first]) @ truth[second]
+    errors = inverse(true_motion) @ (inverse(estimate[first]) @ estimate[second])
+    return RelativeErrors(
+        translation_m=statistics(np.linalg.norm(errors[:, :3, 3], axis=1)),
+        rotation_deg=statistics(np.degrees([rotation_angle(error) for error in errors])),
+    )

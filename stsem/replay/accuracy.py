@@ -29,7 +29,7 @@ def score(judged: Judged | None, classes: ClassSet) -> doc.Score | None:
 
 
 def strata(found: Accuracy | None, classes: ClassSet) -> dict[str, doc.Score]:
-    """Scores of the segmented and of the propagated frames."""
+    """Scores of the segmented and of the propagated frames, and of what the latter cover."""
     if found is None:
         return {}
     scores = {name: score(judged, classes) for name, judged in found.strata.items()}
@@ -39,8 +39,12 @@ def strata(found: Accuracy | None, classes: ClassSet) -> dict[str, doc.Score]:
 def distances(rows: tuple[DistanceRow, ...]) -> tuple[doc.DistanceRow, ...]:
     """Accuracy over the distance to the keyframe."""
     return tuple(
-        doc.DistanceRow(frames=r.frames, ms=r.ms, miou=r.miou, pixel_accuracy=r.pixel_accuracy, n=r.n) for r in rows
-    )
+        doc.DistanceRow(
+            frames=r.frames, ms=r.ms, miou=r.miou, pixel_accuracy=r.pixel_accuracy, n=r.n, covered=r.covered,
+            covered_miou=r.covered_miou, covered_pixel_accuracy=r.covered_pixel_accuracy,
+        )
+        for r in rows
+    )  # fmt: skip
 
 
 def distance_summary(found: DistanceSummary | None) -> doc.DistanceSummary | None:

@@ -4,15 +4,14 @@ The real-time run calls these steps as jobs on the simulated cores, the offline 
 by the same rule.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from stsem.frame import Frame, Segmentation
-from stsem.result import FrameResult
-from stsem.stages.keyframe import Keyframe
-from stsem.stages.propagate import Propagation
-from stsem.stages.register import Registering, Registration
+from stsem.stages.candidate import Candidate, KeyframePolicy, Motion
+from stsem.stages.keyframe import Keyframe, view_of
+from stsem.stages.propagation.method import Predicted, Propagation
+from stsem.stages.register import Anchor, Registering, Registration
 from stsem.stages.segment import Segmenter
-from stsem.stages.select import Candidate, KeyframePolicy, Motion
 
 FIRST, EVERY_FRAME = "first", "every frame"
 
@@ -23,8 +22,8 @@ class Prediction:
 
     Args:
         policy: which frames become keyframes.
-        method: how the others are labelled.
-        register: needed by either; None if neither looks at a homography.
+        method: how the others are labelled; of this run alone.
+        register: what relates frames to keyframes; None if nobody asks.
     """
 
     policy: KeyframePolicy
@@ -32,8 +31,25 @@ class Prediction:
     register: Registering | None
 
 
+@dataclass(frozen=True, eq=False)
+class _Chosen:
+    """A frame that was selected, and what related it to those before."""
+
+    frame: Frame
+    registration: Registration | None
+
+    @property
+    def anchor(self) -> Anchor | None:
+        features = None if self.registration is None else self.registration.features
+        return None if features is None else Anchor(self.frame.index, features)
+
+
 class AnswerRule:
-    """The steps of one mode over one log, with their memory.
+    """The steps of one mode over one log, with the keyframes it remembers.
+
+    Frames are predicted from `source`, the finished keyframe with the newest stamp. Between a keyframe's choice and its
+    labels any number of frames may be answered; each is registered to the last *selected* keyframe if the policy looks
+    at that, and to the source if the method does.
 
     Args:
         segmenter: labels keyframes.
@@ -42,7 +58,8 @@ class AnswerRule:
 
     def __init__(self, segmenter: Segmenter, prediction: Prediction | None) -> None:
         self._segmenter, self._prediction = segmenter, prediction
-        self._selected: tuple[Frame, Registration | None] | None = None
+        self._selected: _Chosen | None = None
+        self._unfinished: dict[int, _Chosen] = {}
         self._source: Keyframe | None = None
         self._deferred: str | None = None
         self.moved = 0
@@ -59,16 +76,16 @@ class AnswerRule:
         return self._source
 
     def register(self, frame: Frame) -> Registration | None:
-        """Features of `frame` and the homography from the last selected keyframe to it."""
+        """What relates `frame` to the last selected keyframe and to the source."""
         if self._prediction is None or self._prediction.register is None:
             return None
-        keyframe, registration = self._selected or (None, None)
-        if keyframe is None or registration is None:
-            return self._prediction.register(frame, None, None)
-        return self._prediction.register(frame, registration.features, keyframe.index)
+        return self._prediction.register(frame, self._anchors(self._prediction))
 
     def choose(self, frame: Frame, registration: Registration | None) -> str | None:
-        """Why `frame` is a keyframe, or None; a chosen frame is remembered as the last selected one."""
+        """Why `frame` is a keyframe, or None; a chosen frame is remembered as the last selected one.
+
+        It must be given to `finish` or `abandon` later.
+        """
         if self._prediction is None:
             return EVERY_FRAME
         reason = self._deferred or self._reason(self._prediction.policy, frame, registration)
@@ -79,7 +96,8 @@ class AnswerRule:
             self._deferred = reason
             return None
         self._deferred = None
-        self._selected = frame, registration
+        self._selected = self._unfinished[frame.index] = _Chosen(frame, registration)
+        self._prediction.method.selected(frame, registration)
         return reason
 
     def segment(self, frame: Frame) -> Segmentation | None:
@@ -89,27 +107,51 @@ class AnswerRule:
 
     def finish(self, frame: Frame, answer: Segmentation) -> None:
         """The keyframe `frame` is finished: later frames may be predicted from it."""
-        if self._source is None or frame.stamp_ns >= self._source.stamp_ns:
-            self._source = Keyframe(frame.index, frame.stamp_ns, answer)
+        chosen, method = self._unfinished.pop(frame.index, None), self._method
+        anchor = None if chosen is None else chosen.anchor
+        features = None if anchor is None else anchor.features
+        keyframe = Keyframe(frame.index, frame.stamp_ns, answer, features, view_of(frame), frame.image)
+        if method is not None:
+            method.finished(keyframe)
+        older, self._source = self._source, keyframe
+        if older is not None and older.stamp_ns > keyframe.stamp_ns:
+            older, self._source = keyframe, older
+        if method is not None and older is not None and older.index != self._source.index:
+            method.forgotten(older.index)
 
-    def propagate(self, frame: Frame, registration: Registration | None) -> Segmentation | None:
+    def abandon(self, frame: Frame) -> None:
+        """The chosen `frame` will not be segmented after all: a newer one took its place before the network."""
+        self._unfinished.pop(frame.index, None)
+        if self._method is not None:
+            self._method.forgotten(frame.index)
+
+    def propagate(self, frame: Frame, registration: Registration | None) -> Predicted | None:
         """Labels predicted from `source`; None without one, or in a mode that never predicts."""
         if self._prediction is None or self._source is None:
             return None
-        homography = None if registration is None else registration.homography
-        return self._prediction.method.propagate(self._source, frame, homography)
+        return self._prediction.method.predict(self._source, frame, registration)
+
+    @property
+    def _method(self) -> Propagation | None:
+        return None if self._prediction is None else self._prediction.method
+
+    def _anchors(self, rule: Prediction) -> tuple[Anchor, ...]:
+        """The last selected keyframe if the policy looks at it, the source if the method does, each once."""
+        found: dict[int, Anchor] = {}
+        looks = rule.policy.needs_homography or rule.policy.needs_coverage
+        if looks and self._selected is not None and (anchor := self._selected.anchor):
+            found[anchor.index] = anchor
+        source = self._source
+        if rule.method.needs.points and source is not None and source.features is not None:
+            found.setdefault(source.index, Anchor(source.index, source.features))
+        return tuple(found.values())
 
     def _reason(self, policy: KeyframePolicy, frame: Frame, registration: Registration | None) -> str | None:
         if self._selected is None:
             return FIRST
-        last = self._selected[0]
-        homography = None if registration is None else registration.homography
+        last = self._selected.frame
+        homography = None if registration is None else registration.homographies.get(last.index)
         motion = None if homography is None else Motion.of(homography, frame.size)
-        return policy.reason(Candidate(frame.index, last.index, frame.stamp_ns - last.stamp_ns, motion))
-
-
-def with_answer(result: FrameResult, answer: Segmentation | None) -> FrameResult:
-    """`result` with the images of its answer, if there is one."""
-    if answer is None:
-        return result
-    return replace(result, labels=answer.labels, confidence=answer.confidence, uncertainty=answer.uncertainty)
+        coverage = None if registration is None else registration.coverage
+        elapsed_ns = frame.stamp_ns - last.stamp_ns
+        return policy.reason(Candidate(frame.index, frame.stamp_ns, last.index, elapsed_ns, motion, coverage))

@@ -21,10 +21,12 @@ from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTimes, TimedInferencer, TimedPropagation, TimedRegister
 from stsem.replay.memo import Memo
 from stsem.replay.modes import Mode
-from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.candidate import KeyframePolicy
+from stsem.stages.propagate import AUTO, IN_SPACE, IN_THE_IMAGE, PROPAGATIONS
+from stsem.stages.propagation.method import Propagation
 from stsem.stages.register import Register
 from stsem.stages.segment import NetworkSegmenter, OracleSegmenter, Segmenter
-from stsem.stages.select import KeyframePolicy, parse_policy
+from stsem.stages.select import parse_policy
 
 NETWORK_THREADS = 2
 """Threads of the network on two or more simulated cores; its output does not depend on them."""
@@ -50,10 +52,22 @@ class Model:
     reason: str
     segmenter: Callable[[int, StageTimes], Segmenter]
 
-    def needs(self, *, fused: bool) -> frozenset[str]:
-        """Roles beside colour whose messages a frame waits for (DESIGN 3); with a map (`fused`) depth and poses."""
-        depth = frozenset({"depth"}) if self.network is not None and self.network.has_depth else frozenset[str]()
-        return depth | NEEDS if fused else depth
+
+def needed_roles(model: Model, config: RunConfig, *, fused: bool) -> frozenset[str]:
+    """Roles beside colour whose messages a frame waits for: the union over the modes (DESIGN 3).
+
+    Args:
+        model, config: of the run.
+        fused: whether a map is built, which takes depth and poses.
+    """
+    depth = frozenset({"depth"}) if model.network is not None and model.network.has_depth else frozenset[str]()
+    needs = depth | NEEDS if fused or _predicts_in_space(config) else depth
+    return needs - {"pose"} | {"depth"} if config.pose == "slam" else needs
+
+
+def _predicts_in_space(config: RunConfig) -> bool:
+    predicts = any(not mode.segments_every_frame for mode in config.modes)
+    return predicts and PROPAGATIONS[config.propagation].needs.space
 
 
 def build_model(log: Log, config: RunConfig) -> Model:
@@ -64,9 +78,11 @@ def build_model(log: Log, config: RunConfig) -> Model:
         MissingExtraError: the backend is not installed.
         NetworkError: the network cannot be used, or has no variant for the precision.
         ClassTableError: the oracle without truth, or a class map that cannot be read or names unknown classes.
-        ChannelError: the network takes depth, but the log has none that can be used.
+        ChannelError: the network or the propagation takes depth, but the log has none that can be used; or the
+            propagation takes poses or a camera, and the log lacks them.
     """
     choose_backend(config.backend, config.precision)
+    _check_space(log, config)
     class_map = read_class_map(config.class_map) if config.class_map else {}
     if config.is_oracle:
         return _oracle(log)
@@ -77,24 +93,37 @@ def build_model(log: Log, config: RunConfig) -> Model:
     return Model(Path(config.model).name, network, classes, table, reason, make)
 
 
-def build_rule(mode: Mode, segmenter: Segmenter, config: RunConfig, times: StageTimes) -> AnswerRule:
-    """The steps of `mode`, with a memory of their own."""
+def build_rule(mode: Mode, segmenter: Segmenter, classes: ClassSet, config: RunConfig, times: StageTimes) -> AnswerRule:
+    """The steps of `mode`, with a memory of their own; `classes`: of the labels."""
     if mode.segments_every_frame:
         return AnswerRule(segmenter, None)
-    policy = policy_of(config)
-    method = PROPAGATIONS[config.propagation]()
-    needed = policy.needs_homography or method.needs_homography
-    register = TimedRegister(Register(config.seed), times) if needed else None
-    return AnswerRule(segmenter, Prediction(policy, TimedPropagation(method, times), register))
+    policy, method = policy_of(config), PROPAGATIONS[config.propagation].make(classes, config.seed)
+    register = registering(policy, method, config.seed)
+    timed = None if register is None else TimedRegister(register, times)
+    return AnswerRule(segmenter, Prediction(policy, TimedPropagation(method, times), timed))
+
+
+def registering(policy: KeyframePolicy, method: Propagation, seed: int) -> Register | None:
+    """What a policy and a method ask of `register`; None if nothing."""
+    points, follows = policy.needs_homography or method.needs.points, method.needs.follows
+    foretells = policy.needs_coverage
+    if not (points or follows or foretells):
+        return None
+    return Register(seed, points, method if follows else None, method if foretells else None)
 
 
 def policy_of(config: RunConfig) -> KeyframePolicy:
-    """The keyframe policy with its numbers."""
+    """The keyframe policy with its numbers, for one run.
+
+    What a method loses is what it does not cover only where it knows the pixels in space: a chain of flows that never
+    left the image, or the outline of a homography, says little about what is right (docs/keyframes.md).
+    """
     return parse_policy(
         config.keyframes,
         rotation=config.keyframe_rotation,
         translation=config.keyframe_translation,
         time_ns=round(config.keyframe_time_s * 1e9),
+        covers=PROPAGATIONS[config.propagation].needs.space,
     )
 
 
@@ -119,12 +148,47 @@ def _oracle(log: Log) -> Model:
     return Model("oracle", None, log.classes, None, "", lambda threads, times: Memo(segmenter))
 
 
+def settled(log: Log, config: RunConfig) -> RunConfig:
+    """`config` with the propagation that `auto` means for this log."""
+    if config.propagation != AUTO:
+        return config
+    return config.model_copy(update={"propagation": IN_THE_IMAGE if _lacking(log, config) else IN_SPACE})
+
+
+def _lacking(log: Log, config: RunConfig) -> str | None:
+    """The first thing that a propagation in space takes and no frame of the log has."""
+    choice, camera = log.info.choice, log.camera
+    lacking = {
+        "depth": choice.depth is None, "pose": choice.pose is None and config.pose == "log",
+        "camera": camera is None or camera.is_distorted,
+    }  # fmt: skip
+    return next((role for role, absent in lacking.items() if absent), None)
+
+
+def _check_space(log: Log, config: RunConfig) -> None:
+    """Raise ChannelError where the propagation takes what no frame of the log has."""
+    if not _predicts_in_space(config):
+        return
+    if missing := _lacking(log, config):
+        what = "calibrated camera without distortion" if missing == "camera" else f"{missing} channel"
+        hint = "" if missing == "camera" else f"name one with --topic {missing}=TOPIC, or "
+        raise ChannelError(
+            f"--propagation {config.propagation} takes depth, poses and a calibrated camera, but {log.info.name} has "
+            f"no {what} that can be used{_said_of(log, missing)}; {hint}choose another propagation.",
+            missing,
+        )
+
+
+def _said_of(log: Log, role: str) -> str:
+    """What the log's warnings say about `role`, in brackets."""
+    return next((f" ({str(said).rstrip('.')})" for said in log.info.warnings if role in said), "")
+
+
 def _check_depth(network: Network, log: Log) -> None:
     if network.has_depth and log.info.choice.depth is None:
-        why = next((f" ({str(said).rstrip('.')})" for said in log.info.warnings if "depth" in said), "")
         raise ChannelError(
-            f"The network {network.name} takes depth, but {log.info.name} has no depth channel that can be used{why}; "
-            "name one with --topic depth=TOPIC, or choose another network with --model.",
+            f"The network {network.name} takes depth, but {log.info.name} has no depth channel that can be used"
+            f"{_said_of(log, 'depth')}; name one with --topic depth=TOPIC, or choose another network with --model.",
             "depth",
         )
 

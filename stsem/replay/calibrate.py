@@ -1,27 +1,36 @@
 """A cost profile for this machine, measured on frames of the log (`--costs auto`, `stsem costs measure`)."""
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import count
 
 from stsem import hostclock
-from stsem.frame import Frame
-from stsem.geometry.features import Features
+from stsem.frame import Frame, Segmentation
 from stsem.inference.inferencer import Inferencer
 from stsem.inference.network import Network
 from stsem.inference.threads import set_threads
 from stsem.mapping.cloud import LabelledCloud
 from stsem.sim.profile import CostProfile, key
+from stsem.slam.system import Slam
+from stsem.stages.candidate import KeyframePolicy
 from stsem.stages.fuse import Fuse
-from stsem.stages.keyframe import Keyframe
-from stsem.stages.propagate import Propagation
-from stsem.stages.register import Register
+from stsem.stages.keyframe import Keyframe, view_of
+from stsem.stages.propagation.method import Needs, Propagation
+from stsem.stages.register import Anchor, Register
+from stsem.stages.track import fitting
 
 SAMPLES = 12
 LIMIT_NS = 10 * 10**9
 _WARM_UP = 2
+_MEMORY = 40
+"""Keyframes before the newest: more than any method remembers."""
 _BATCH_NS = 250 * 10**6
 _OTHER_WORK = 0.10
 """Share of one core: a batch during which the rest of the machine used more is dropped."""
+
+
+_Stage = tuple[str, int, Iterable[Frame], Callable[[Frame], object]]
+"""(stage, cores, frames to measure it on, its work)."""
 
 
 @dataclass(frozen=True)
@@ -33,17 +42,23 @@ class Subject:
         backend, precision: how it runs.
         network_cores: core counts to measure the network with.
         propagation: the method between keyframes.
+        method: its object, which nobody else uses.
+        policy: of keyframes, which may ask `register` for more.
         seed: of registration.
         decode: decodes some frame of the log anew; None to leave decoding out.
+        walk: frames to track, each near the one before, and the last near the first; None to leave tracking out.
     """
 
     network: Network
     backend: str
     precision: str
     network_cores: tuple[int, ...]
-    propagation: Propagation
+    propagation: str
+    method: Propagation
+    policy: KeyframePolicy
     seed: int
     decode: Callable[[], object] | None = None
+    walk: Iterable[Frame] | None = None
 
 
 def measure(subject: Subject, frames: list[Frame], *, samples: int = SAMPLES, limit_ns: int = LIMIT_NS) -> CostProfile:
@@ -66,15 +81,14 @@ def measure(subject: Subject, frames: list[Frame], *, samples: int = SAMPLES, li
     width, height = frames[0].size
     made_for = {
         "network": subject.network.name, "model_sha256": subject.network.sha256, "image": f"{width}x{height}",
-        "backend": f"{subject.backend} {subject.precision}",
+        "backend": f"{subject.backend} {subject.precision}", "propagation": subject.propagation,
+        "register": registers(subject.policy, subject.method.needs),
     }  # fmt: skip
     return CostProfile(hostclock.machine_name(), found, disturbed, made_for)
 
 
-def _stages(subject: Subject, frames: list[Frame]) -> Iterator[tuple[str, int, list[Frame], Callable[[Frame], object]]]:
-    """(stage, cores, frames to measure it on, its work)."""
-    register = Register(subject.seed)
-    features: Features = register(frames[0], None, None).features
+def _stages(subject: Subject, frames: list[Frame]) -> Iterator[_Stage]:
+    """Every stage that there is a cost for."""
     answer = None
     for cores in subject.network_cores:
         network = Inferencer(subject.network, backend=subject.backend, precision=subject.precision, threads=cores)
@@ -82,19 +96,62 @@ def _stages(subject: Subject, frames: list[Frame]) -> Iterator[tuple[str, int, l
         yield "segment", cores, frames, network.infer
     if answer is None:
         raise ValueError("a profile needs the network on at least one number of cores")
-    keyframe = Keyframe(frames[0].index, frames[0].stamp_ns, answer)
-    last = register(frames[1], features, frames[0].index).homography
     fuse, labels = Fuse(LabelledCloud()), answer
-    yield "register", 1, frames, lambda frame: register(frame, features, frames[0].index)
-    yield "propagate", 1, frames, lambda frame: subject.propagation.propagate(keyframe, frame, last)
+    yield from _between_keyframes(subject, frames, answer)
     if (decode := subject.decode) is not None:
         yield "decode", 1, frames, lambda frame: decode()
     if fusable := [frame for frame in frames if fuse.can_fuse(frame)]:
         yield "fuse", 1, fusable, lambda frame: fuse(frame, labels)
+    if subject.walk is not None:
+        yield "track", 1, subject.walk, _tracking(subject.seed)
+
+
+def _tracking(seed: int) -> Callable[[Frame], object]:
+    """Tracks the frames it is given as if they were one long log."""
+    started: list[Slam] = []
+    numbers = count()
+
+    def track(frame: Frame) -> object:
+        if frame.camera is None:
+            raise ValueError("tracking needs a camera")
+        if not started:
+            started.append(Slam(frame.camera, seed))
+        return started[0].track(replace(fitting(frame, frame.camera), index=next(numbers)))
+
+    return track
+
+
+def registers(policy: KeyframePolicy, needs: Needs) -> str:
+    """What the stage `register` does, in words, as a profile's `made_for` has it."""
+    parts = {
+        "points": policy.needs_homography or needs.points,
+        "the method's own": needs.follows,
+        "coverage": policy.needs_coverage,
+    }
+    return " and ".join(name for name, does in parts.items() if does) or "points"
+
+
+def _between_keyframes(subject: Subject, frames: list[Frame], answer: Segmentation) -> Iterator[_Stage]:
+    """`register` and `propagate` from the first frame as the newest keyframe, with the method's memory full."""
+    method, needs = subject.method, subject.method.needs
+    follower = method if needs.follows else None
+    foreteller = method if subject.policy.needs_coverage else None
+    points = subject.policy.needs_homography or needs.points
+    register = Register(subject.seed, points or not (follower or foreteller), follower, foreteller)
+    first = register(frames[0], ())
+    method.selected(frames[0], first)
+    for i in range(_MEMORY, -1, -1):
+        frame = frames[i % len(frames)]
+        keyframe = Keyframe(frame.index, frames[0].stamp_ns - i, answer, first.features, view_of(frame), frame.image)
+        method.finished(keyframe)
+    anchors = () if first.features is None else (Anchor(frames[0].index, first.features),)
+    last = register(frames[1], anchors)
+    yield "register", 1, frames, lambda frame: register(frame, anchors)
+    yield "propagate", 1, frames, lambda frame: method.predict(keyframe, frame, last)
 
 
 def _sample(
-    work: Callable[[Frame], object], frames: list[Frame], wanted: int, limit_ns: int
+    work: Callable[[Frame], object], frames: Iterable[Frame], wanted: int, limit_ns: int
 ) -> tuple[tuple[int, ...], bool]:
     """(durations in ns, whether too few of them were undisturbed)."""
     supply = _forever(frames)
@@ -135,6 +192,5 @@ def _batch(work: Callable[[Frame], object], supply: Iterator[Frame]) -> tuple[li
 
 
 def _forever(frames: Iterable[Frame]) -> Iterator[Frame]:
-    kept = list(frames)
     while True:
-        yield from kept
+        yield from frames

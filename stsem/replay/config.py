@@ -9,7 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, f
 
 from stsem.replay.modes import Mode, parse_modes
 from stsem.replay.queues import parse_queue
-from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.propagate import AUTO, IN_SPACE, PROPAGATIONS
 from stsem.stages.select import parse_policy
 
 _SWITCHES = {"on": True, "yes": True, "true": True, "1": True, "off": False, "no": False, "false": False, "0": False}
@@ -29,6 +29,7 @@ def _number_as_text(value: object) -> object:
 LONGEST_S = 1e9
 """No duration is longer: 31 years fit into integer nanoseconds with room to spare."""
 
+PoseSource = Literal["log", "slam"]
 Switch = Annotated[bool, BeforeValidator(_on_off)]
 Text = Annotated[str, BeforeValidator(_number_as_text)]
 Where: dict[str, JsonValue] = {"where": True}
@@ -56,15 +57,21 @@ class RunConfig(BaseModel):
     model: str = Field("default", description="Shipped network, a FILE.onnx with its sidecar .toml, or 'oracle'.")
     backend: str = Field("onnxruntime", description="What runs the network: onnxruntime or openvino.")
     precision: str = Field("f32", description="Arithmetic of the network: f32, int8 or (openvino only) bf16.")
-    keyframes: str = Field("paper", description="Keyframe policy: 'paper' or 'every:N'.")
+    keyframes: str = Field("paper", description="Keyframe policy: 'paper', 'every:N', 'coverage:SHARE' or 'budget:HZ'.")
     keyframe_rotation: float = Field(0.1, gt=0, description="paper: threshold on |H[:2,:2] - I|_F.")
     keyframe_translation: float = Field(0.15, gt=0, description="paper: threshold on |H[:2,2]|, in image widths.")
     keyframe_time_s: float = Field(
-        1.0, gt=0, le=LONGEST_S, description="paper: longest time between keyframes, seconds."
+        1.0, gt=0, le=LONGEST_S, description="paper, coverage: longest time between keyframes, seconds."
     )
-    propagation: str = Field("homography", description="How frames between keyframes are predicted.")
-    pose: Literal["log"] = Field("log", description="Where the camera's pose comes from.")
-    map: Switch = Field(True, description="Build the labelled map where the log has depth and poses.")
+    propagation: str = Field(
+        AUTO,
+        description="How frames between keyframes are predicted; 'auto': 'depth' where the log has what it takes, "
+        "else 'flow'.",
+    )
+    pose: PoseSource = Field(
+        "log", description="Where the camera's pose comes from: the log, or 'slam' on colour and depth."
+    )
+    map: Switch = Field(True, description="Build the labelled map where there is depth and poses.")
     depth_registered: Literal["auto", "yes", "no"] = Field(
         "auto", description="Whether depth pixels match colour pixels."
     )
@@ -114,8 +121,8 @@ class RunConfig(BaseModel):
     @field_validator("propagation")
     @classmethod
     def _propagation_exists(cls, text: str) -> str:
-        if text not in PROPAGATIONS:
-            raise ValueError(f"there is no propagation {text!r}; there is {', '.join(PROPAGATIONS)}")
+        if text not in (AUTO, *PROPAGATIONS):
+            raise ValueError(f"there is no propagation {text!r}; there is {AUTO}, {', '.join(PROPAGATIONS)}")
         return text
 
     @field_validator("queue")
@@ -141,7 +148,25 @@ class RunConfig(BaseModel):
             raise ValueError(f"the window ends at {self.end:g} s, not after its start at {self.start or 0.0:g} s")
         if self.sustainable and self.clock == "offline":
             raise ValueError("--sustainable needs the simulated clock, but --clock offline was asked for")
+        self._check_coverage()
         return self
+
+    def _check_coverage(self) -> None:
+        """Raise ValueError where a policy asks for coverage that nobody could tell."""
+        method = PROPAGATIONS[IN_SPACE if self.propagation == AUTO else self.propagation]
+        policy = parse_policy(self.keyframes, rotation=1.0, translation=1.0, time_ns=1, covers=method.needs.space)
+        if not policy.needs_coverage or all(mode.segments_every_frame for mode in self.modes):
+            return
+        if not method.covers:
+            raise ValueError(
+                f"--keyframes {self.keyframes} asks how much a prediction covers, which --propagation "
+                f"{self.propagation} cannot tell; choose another propagation, or --keyframes paper, every:N, budget:HZ"
+            )
+        if self.sustainable:
+            raise ValueError(
+                f"--sustainable decides keyframes without images, but --keyframes {self.keyframes} asks how much of an "
+                "image is covered; choose paper or every:N"
+            )
 
     @property
     def modes(self) -> tuple[Mode, ...]:

@@ -5,7 +5,7 @@ import hashlib
 import importlib.metadata
 import itertools
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,17 +17,21 @@ from stsem.inference.cache import cache_root
 from stsem.inference.network import DEFAULT, Network, load_network
 from stsem.inference.variant import at_precision
 from stsem.log.log import Log
-from stsem.replay.build import Model
-from stsem.replay.calibrate import Subject, measure
+from stsem.replay.build import Model, needed_roles, policy_of
+from stsem.replay.calibrate import Subject, measure, registers
 from stsem.replay.config import RunConfig
 from stsem.replay.modes import Mode
+from stsem.replay.posing import posing
+from stsem.replay.tracking import posed
 from stsem.sim.costs import CostSource, MeasuredCosts, ProfileCosts, TraceCosts
 from stsem.sim.profile import CostProfile, load_profile
 from stsem.sim.trace import is_trace, read_durations
 from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.track import SlamTracker, Tracker
 
 _CALIBRATION_FRAMES = 12
 _DECODED_FRAMES = 60
+_TRACKED_FRAMES = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,21 +98,43 @@ def _of_profile(name: str, profile: CostProfile, log: Log, config: RunConfig) ->
     return Costing(name, lambda mode: source, profile.sha256, profile)
 
 
-def subject(log: Log, config: RunConfig, model: Model, cores: tuple[int, ...], *, fused: bool) -> Subject:
-    """What a profile for this configuration must hold; `cores`: how many the network may claim."""
+def subject(
+    log: Log, config: RunConfig, model: Model, cores: tuple[int, ...], *, fused: bool, track: bool = False
+) -> Subject:
+    """What a profile for this configuration must hold; `cores`: how many the network may claim; `track`: with SLAM."""
     network: Network = model.network or at_precision(load_network(DEFAULT), config.precision)
-    decode = _decoder(log, depth="depth" in model.needs(fused=fused)) if config.count_decode else None
+    decode = _decoder(log, depth="depth" in needed_roles(model, config, fused=fused)) if config.count_decode else None
+    method = PROPAGATIONS[config.propagation].make(model.classes, config.seed)
     return Subject(
-        network, config.backend, config.precision, cores, PROPAGATIONS[config.propagation](), config.seed, decode
+        network, config.backend, config.precision, cores, config.propagation, method, policy_of(config), config.seed,
+        decode,
+        _ThereAndBack(log) if track else None,
     )  # fmt: skip
 
 
-def calibration_frames(log: Log, needs: frozenset[str]) -> list[Frame]:
+@dataclass(frozen=True, eq=False)
+class _ThereAndBack:
+    """The first frames of the log, forwards and then backwards, decoded as they are asked for."""
+
+    log: Log
+
+    def __iter__(self) -> Iterator[Frame]:
+        there, any_decoded = range(min(len(self.log.plans), _TRACKED_FRAMES)), False
+        for index in (*there, *reversed(there[1:-1])):
+            with contextlib.suppress(DecodeError):
+                yield self.log.frame(index, depth=True, previous=False)
+                any_decoded = True
+        if not any_decoded:
+            raise CostError(f"None of the first {len(there)} frames can be decoded; give a profile with --costs.")
+
+
+def calibration_frames(log: Log, needs: frozenset[str], tracker: Tracker | None = None) -> list[Frame]:
     """The first decodable frames of the log that lack nothing, or, when there are too few of them, the first at all.
 
     Args:
         log: opened.
-        needs: roles that stages look at (`Model.needs`).
+        needs: roles that stages look at (`needed_roles`).
+        tracker: gives the frames their poses; None for those of the log.
 
     Raises:
         CostError: fewer than two frames can be decoded.
@@ -121,21 +147,26 @@ def calibration_frames(log: Log, needs: frozenset[str]) -> list[Frame]:
                 found.append(loaded.frame)
     if len(found) < 2:
         raise CostError("Costs cannot be measured on fewer than two decodable frames; give a profile with --costs.")
-    return found
+    return found if tracker is None else [posed(frame, tracker.prepare(frame)()) for frame in found]
 
 
 def _calibrated(log: Log, config: RunConfig, model: Model, fused: bool, say: Callable[[str], None]) -> CostProfile:
-    cores = tuple(sorted({min(mode.network_cores, config.cores) for mode in config.modes}))
-    wanted = subject(log, config, model, cores, fused=fused)
-    frames = calibration_frames(log, model.needs(fused=fused))
+    tracks = posing(log, config).tracks
+    cores = tuple(sorted({mode.cores(config.cores, tracks=tracks) for mode in config.modes}))
+    wanted = subject(log, config, model, cores, fused=fused, track=tracks)
+    tracker = SlamTracker(log.camera, config.seed) if tracks and log.camera is not None else None
+    frames = calibration_frames(log, needed_roles(model, config, fused=fused), tracker)
     distribution = BACKENDS[wanted.backend].distribution
     about = {
         "machine": hostclock.machine_name(), "network": wanted.network.sha256, "size": frames[0].size,
         "backend": [wanted.backend, wanted.precision], "cores": wanted.network_cores,
-        "propagation": config.propagation, "fused": fused, "decode": config.count_decode,
+        "propagation": config.propagation, "register": registers(wanted.policy, wanted.method.needs),
+        "fused": fused, "decode": config.count_decode,
         distribution: importlib.metadata.version(distribution),
         "opencv": importlib.metadata.version("opencv-python-headless"), "stsem": __version__,
     }  # fmt: skip
+    if tracks:
+        about["track"] = True
     digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:16]
     path = cache_root() / "costs" / f"{digest}.json"
     if config.cache and (kept := _kept(path)) is not None:

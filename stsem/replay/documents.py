@@ -11,10 +11,16 @@ from stsem.errors import EXIT_FINE, EXIT_LOSSY, EXIT_NOTHING_MEASURED
 from stsem.inference.backends import BACKENDS
 from stsem.inference.cpu import cpu_features
 from stsem.log.log import Log
+from stsem.replay.behind import fell_behind
+from stsem.replay.build import policy_of
+from stsem.replay.calibrate import registers
 from stsem.replay.comparison import Contender, compare
 from stsem.replay.engine import Replayed
 from stsem.replay.runs import Context, Found, part, scored, without_scores
+from stsem.stages.propagate import PROPAGATIONS
 
+_UNNAMED = "homography", "points"
+"""Method and work of `register` that profiles were measured with which do not name them."""
 _PACKAGES = ("mcap", "numpy", "onnxruntime", "opencv-python-headless")
 
 
@@ -175,13 +181,52 @@ def _foreign_costs(context: Context) -> list[str]:
     ]
 
 
+def _other_method(context: Context) -> list[str]:
+    """That the durations between keyframes are those of another method, or that nobody knows of which."""
+    profile, config = None if context.costing is None else context.costing.profile, context.config
+    if profile is None or all(mode.segments_every_frame for mode in config.modes):
+        return []
+    ran = config.propagation, registers(policy_of(config), PROPAGATIONS[config.propagation].needs)
+    measured = profile.made_for.get("propagation", _UNNAMED[0]), profile.made_for.get("register", _UNNAMED[1])
+    if measured == ran:
+        return []
+    return [
+        f"The cost profile was measured with --propagation {measured[0]} (register: {measured[1]}), but the run used "
+        f"{ran[0]} (register: {ran[1]}): the durations of `register` and `propagate` are the former's."
+    ]
+
+
+def _second_keyframe(context: Context) -> list[str]:
+    """That profiles know what it takes to register a frame to one keyframe, not to two."""
+    profile, config = None if context.costing is None else context.costing.profile, context.config
+    policy = policy_of(config)
+    looks = policy.needs_homography or policy.needs_coverage
+    if profile is None or not (looks and PROPAGATIONS[config.propagation].needs.points):
+        return []
+    return [
+        f"{mode.name} registers a frame to two keyframes while a newer one is on its way, but the cost profile was "
+        "measured with one: its durations of `register` are too short."
+        for mode in config.modes
+        if mode.in_background
+    ]
+
+
 def _warnings(context: Context) -> tuple[str, ...]:
     found = [*map(str, context.log.info.warnings), *context.notes]
+    if sentence := context.replayed.posing.sentence:
+        found.append(sentence)
     found += [
         f"{run.mode.name} answered no frame before its run ended: the jobs last too long for this log."
         for run in context.replayed.runs
         if run.real_time is not None and not any(result.outcome.is_answer for result in run.real_time.results)
     ]
+    found += [said for run in context.replayed.runs for said in fell_behind(context, run)]
+    if context.config.cores == 1 and context.config.clock == "real-time":
+        found += [
+            f"{mode.name} needs two cores to answer while the network works; with one, answers wait for it."
+            for mode in context.config.modes
+            if mode.in_background
+        ]
     if lacking := context.replayed.without_depth:
         frames = len(context.replayed.slots)
         found.append(
@@ -191,7 +236,7 @@ def _warnings(context: Context) -> tuple[str, ...]:
     costing = context.costing
     if costing is not None and costing.profile is not None and costing.profile.disturbed:
         found.append("The cost profile was measured while other work held a core; its durations are too long.")
-    found += _foreign_costs(context)
+    found += _foreign_costs(context) + _other_method(context) + _second_keyframe(context)
     if context.config.costs == "measured" and context.config.clock == "real-time":
         found.append("Durations were measured as they happened on this machine: timing does not repeat.")
     return tuple(found)

@@ -10,13 +10,15 @@ from stsem.classes import Labels
 from stsem.frame import Frame, Image
 from stsem.inference.threads import set_threads
 from stsem.log.log import Loaded, Log
-from stsem.replay.build import NETWORK_THREADS, Model
+from stsem.replay.build import NETWORK_THREADS, Model, needed_roles
 from stsem.replay.config import RunConfig
 from stsem.replay.hosttimes import StageTime, StageTimes
 from stsem.replay.lanes import CostsOf, Lane, ModeRun, Setup
 from stsem.replay.modes import Mode
+from stsem.replay.posing import LOG_POSES, Posing, can_map, hidden, log_poses, posing
 from stsem.replay.schedule import Slot, horizon_ns, schedule
 from stsem.result import FrameResult
+from stsem.stages.track import SlamTracker
 
 PICTURES = 4
 """Frames kept for the strip of pictures."""
@@ -45,6 +47,7 @@ class Replayed:
         stage_times: stage -> what it cost on this host.
         wall_ns: wall-clock duration of the pass.
         without_depth: frames whose depth the network takes and does not have; None for a network that takes none.
+        posing: where the poses came from.
     """
 
     slots: Sequence[Slot]
@@ -53,6 +56,7 @@ class Replayed:
     stage_times: Mapping[str, StageTime]
     wall_ns: int
     without_depth: int | None = None
+    posing: Posing = LOG_POSES
 
 
 def replay_log(
@@ -76,9 +80,9 @@ def replay_log(
     began = hostclock.wall_ns()
     set_threads(1)
     fused, times = can_map(log, config), StageTimes()
-    slots = schedule(log.plans, config.exact_rate, frozenset(), model.needs(fused=fused))
+    slots = schedule(log.plans, config.exact_rate, frozenset(), needed_roles(model, config, fused=fused))
     segmenter = model.segmenter(min(NETWORK_THREADS, config.cores), times)
-    frames_at = partial(_frames, log, model, fused)
+    frames_at = partial(_frames, log, config, model, fused)
     setup = Setup(
         config,
         model,
@@ -89,27 +93,35 @@ def replay_log(
         fused,
         times,
         lambda index: next(frames_at([index])),
+        log_poses(log),
+        _trackers(log, config, times) if posing(log, config).tracks else None,
     )
     lanes = [Lane(setup, mode, _watch_of(mode, watch)) for mode in config.modes]
     pictures, without_depth = _feed(frames_at, setup, lanes, progress)
     end = horizon_ns(slots, log.period_ns, config.exact_rate)
     runs = tuple(lane.finish(end) for lane in lanes)
     counted = without_depth if model.network is not None and model.network.has_depth else None
-    return Replayed(slots, runs, pictures, times.stages, hostclock.wall_ns() - began, counted)
+    return Replayed(slots, runs, pictures, times.stages, hostclock.wall_ns() - began, counted, posing(log, config))
 
 
-def can_map(log: Log, config: RunConfig) -> bool:
-    """Whether a map is wanted, and the log has what it needs."""
-    choice = log.info.choice
-    straight = log.camera is not None and not log.camera.is_distorted
-    return config.map and choice.depth is not None and choice.pose is not None and straight
-
-
-def _frames(log: Log, model: Model, fused: bool, indices: Iterable[int]) -> Generator[Loaded, None, None]:
+def _frames(
+    log: Log, config: RunConfig, model: Model, fused: bool, indices: Iterable[int]
+) -> Generator[Loaded, None, None]:
     """The frames at `indices` with what this replay looks at."""
     previous = model.network is not None and model.network.has_difference
-    depth = "depth" in model.needs(fused=fused)
-    return log.frames(indices, depth=depth, previous=previous, truth=not model.reason)
+    depth = "depth" in needed_roles(model, config, fused=fused)
+    frames = log.frames(indices, depth=depth, previous=previous, truth=not model.reason)
+    return hidden(frames) if config.pose == "slam" else frames
+
+
+def _trackers(log: Log, config: RunConfig, times: StageTimes) -> Callable[[], SlamTracker]:
+    """One tracker for all runs; with measured durations one for each, which works when its jobs do."""
+    if log.camera is None:
+        raise ValueError("SLAM needs a camera")
+    measured = config.costs == "measured" and config.clock == "real-time"
+    make = partial(SlamTracker, log.camera, config.seed, at_once=not measured, measure=partial(times.measure, "track"))
+    shared = make()
+    return make if measured else lambda: shared
 
 
 def _feed(

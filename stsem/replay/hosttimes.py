@@ -1,19 +1,17 @@
 """What the stages cost on this host while a report was made: shown under `host`, never part of a result."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 from stsem import hostclock
 from stsem.frame import Frame, Segmentation
-from stsem.geometry.features import Features
-from stsem.geometry.homography import Homography
 from stsem.inference.inferencer import Inferencer, Output
 from stsem.inference.network import Network
 from stsem.stages.fuse import Fuser
 from stsem.stages.keyframe import Keyframe
-from stsem.stages.propagate import Propagation
-from stsem.stages.register import Registering, Registration
+from stsem.stages.propagation.method import Needs, Predicted, Propagation
+from stsem.stages.register import Anchor, Registering, Registration
 
 T = TypeVar("T")
 
@@ -70,26 +68,46 @@ class TimedRegister:
     inner: Registering
     times: StageTimes
 
-    def __call__(self, frame: Frame, keyframe: Features | None, keyframe_index: int | None) -> Registration:
+    def __call__(self, frame: Frame, anchors: Sequence[Anchor]) -> Registration:
         """See `Registering`."""
-        return self.times.measure("register", lambda: self.inner(frame, keyframe, keyframe_index))
+        return self.times.measure("register", lambda: self.inner(frame, anchors))
 
 
 @dataclass(frozen=True)
 class TimedPropagation:
-    """A timed `Propagation`."""
+    """A `Propagation` whose predictions are timed; what it sees is a part of `register`."""
 
     inner: Propagation
     times: StageTimes
 
     @property
-    def needs_homography(self) -> bool:
-        """See `Propagation.needs_homography`."""
-        return self.inner.needs_homography
+    def needs(self) -> Needs:
+        """See `Propagation.needs`."""
+        return self.inner.needs
 
-    def propagate(self, keyframe: Keyframe, frame: Frame, homography: Homography | None) -> Segmentation:
-        """See `Propagation.propagate`."""
-        return self.times.measure("propagate", lambda: self.inner.propagate(keyframe, frame, homography))
+    def see(self, frame: Frame, registration: Registration) -> None:
+        """See `Propagation.see`."""
+        self.inner.see(frame, registration)
+
+    def selected(self, frame: Frame, registration: Registration | None) -> None:
+        """See `Propagation.selected`."""
+        self.inner.selected(frame, registration)
+
+    def finished(self, keyframe: Keyframe) -> None:
+        """See `Propagation.finished`."""
+        self.inner.finished(keyframe)
+
+    def forgotten(self, index: int) -> None:
+        """See `Propagation.forgotten`."""
+        self.inner.forgotten(index)
+
+    def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
+        """See `Propagation.predict`."""
+        return self.times.measure("propagate", lambda: self.inner.predict(source, frame, registration))
+
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
+        """See `Propagation.expected_coverage`."""
+        return self.inner.expected_coverage(frame, registration)
 
 
 @dataclass(frozen=True)

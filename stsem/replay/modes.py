@@ -14,12 +14,19 @@ class Mode:
     Args:
         name: as on the command line and in the report.
         segments_every_frame: no prediction: each taken frame goes through the network.
-        network_cores: cores that the network claims while it runs.
+        network_cores: cores that the network claims while it runs, where `track` needs none.
+        in_background: keyframes are segmented beside the answer path and answered by prediction, like every frame, so
+            that no answer waits for the network. Without a clock nothing waits, and they are answered by the network.
     """
 
     name: str
     segments_every_frame: bool
     network_cores: int
+    in_background: bool = False
+
+    def cores(self, available: int, *, tracks: bool) -> int:
+        """Cores that the network claims of those `available`; one where `track` works beside it (DESIGN 3)."""
+        return 1 if tracks else min(self.network_cores, available)
 
 
 MODES = {
@@ -27,6 +34,7 @@ MODES = {
     for mode in (
         Mode("per-frame", segments_every_frame=True, network_cores=2),
         Mode("keyframe", segments_every_frame=False, network_cores=2),
+        Mode("keyframe-async", segments_every_frame=False, network_cores=1, in_background=True),
     )
 }
 

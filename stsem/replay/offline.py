@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 
-from stsem.frame import Frame, Segmentation
+from stsem.frame import Frame
 from stsem.log.log import Loaded
-from stsem.replay.answer import AnswerRule, with_answer
-from stsem.replay.realtime import Judge
+from stsem.replay.answer import AnswerRule
+from stsem.replay.ending import Ending, predicted, segmented, unusable
+from stsem.replay.judging import Judge
 from stsem.replay.schedule import Slot
-from stsem.result import FrameResult, Outcome
+from stsem.replay.tracking import posed
 from stsem.stages.fuse import Fuser
+from stsem.stages.track import Tracker
 
 
 class OfflineRun:
@@ -20,50 +22,41 @@ class OfflineRun:
         judge: told of every end (never of arrivals: there is no clock).
         fuse: the map; None without one.
         only_truth: skip frames without truth where no later frame depends on them (`per-frame`); they have no outcome.
+        tracker: finds the poses, of every frame; None where the log gives them.
     """
 
     def __init__(
-        self, slots: Sequence[Slot], rule: AnswerRule, judge: Judge, *, fuse: Fuser | None, only_truth: bool
-    ) -> None:
+        self, slots: Sequence[Slot], rule: AnswerRule, judge: Judge, *, fuse: Fuser | None, only_truth: bool,
+        tracker: Tracker | None = None,
+    ) -> None:  # fmt: skip
         self._slots, self._rule, self._judge, self._fuse = slots, rule, judge, fuse
-        self._only_truth = only_truth
+        self._only_truth, self._tracker = only_truth, tracker
         self._pushed = 0
 
     def push(self, loaded: Loaded) -> None:
         """The next frame of the log."""
         slot = self._slots[self._pushed]
         self._pushed += 1
+        ending = unusable(slot, loaded)
+        frame = None if loaded.frame is None or ending is not None else self._located(loaded.frame)
         if self._only_truth and not slot.has_truth:
             return
-        if loaded.frame is None:
-            reason = "" if loaded.error is None else loaded.error.reason
-            self._end(slot, loaded, Outcome.UNDECODABLE, reason=reason)
-        elif slot.missing:
-            self._end(slot, loaded, Outcome.INCOMPLETE, reason=f"no {' and no '.join(slot.missing)}")
-        else:
-            self._answer(slot, loaded, loaded.frame)
+        if frame is not None:
+            ending = self._answered(frame)
+        if ending is not None:
+            self._judge.ended(ending.result(slot), loaded)
 
-    def _answer(self, slot: Slot, loaded: Loaded, frame: Frame) -> None:
+    def _located(self, frame: Frame) -> Frame:
+        return frame if self._tracker is None else posed(frame, self._tracker.prepare(frame)())
+
+    def _answered(self, frame: Frame) -> Ending:
         registration = self._rule.register(frame) if self._rule.registers else None
         reason = self._rule.choose(frame, registration)
         if reason is None:
-            answer = self._rule.propagate(frame, registration)
-            source = None if self._rule.source is None else self._rule.source.index
-            outcome = Outcome.NO_SOURCE if answer is None else Outcome.PROPAGATED
-            self._end(slot, loaded, outcome, answer=answer, keyframe=source)
-            return
+            return predicted(self._rule.propagate(frame, registration))
         answer = self._rule.segment(frame)
-        if answer is None:
-            self._end(slot, loaded, Outcome.NO_SOURCE, reason="no truth for the oracle")
-            return
-        self._rule.finish(frame, answer)
-        if self._fuse is not None and self._fuse.can_fuse(frame):
-            self._fuse(frame, answer)
-        self._end(slot, loaded, Outcome.SEGMENTED, answer=answer, keyframe=slot.index, reason=reason)
-
-    def _end(
-        self, slot: Slot, loaded: Loaded, outcome: Outcome, *, answer: Segmentation | None = None,
-        keyframe: int | None = None, reason: str = "",
-    ) -> None:  # fmt: skip
-        result = FrameResult(slot.index, slot.stamp_ns, None, None, None, outcome, keyframe, reason)
-        self._judge.ended(with_answer(result, answer), loaded)
+        if answer is not None:
+            self._rule.finish(frame, answer)
+            if self._fuse is not None and self._fuse.can_fuse(frame):
+                self._fuse(frame, answer)
+        return segmented(frame.index, answer, reason)

@@ -2,61 +2,25 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
 
-from stsem.classes import Labels
-from stsem.frame import Frame, Segmentation
+from stsem.frame import Frame
 from stsem.log.log import Loaded
-from stsem.replay.answer import AnswerRule, with_answer
+from stsem.replay.answer import AnswerRule
+from stsem.replay.ending import Ending, unusable
+from stsem.replay.jobs import Jobs
+from stsem.replay.judging import Judge, NewestAnswer
+from stsem.replay.network import Background, NetworkJobs
+from stsem.replay.path import AnswerPath
 from stsem.replay.queues import Mailbox
 from stsem.replay.schedule import Slot, watermarks
+from stsem.replay.tracking import Decoding, TrackWorker
 from stsem.replay.waiting import WaitingRoom
-from stsem.result import STAGES, FrameResult, Outcome, Span
-from stsem.sim.cores import CorePool, Job
+from stsem.result import Outcome, Span
+from stsem.sim.cores import CorePool
 from stsem.sim.costs import CostSource
 from stsem.sim.events import EventQueue, Priority
 from stsem.stages.fuse import Fuser
-from stsem.stages.register import Registration
-
-T = TypeVar("T")
-
-ORDER = {stage: place for place, stage in enumerate(STAGES)}
-"""Place of each stage in the pipeline: among jobs of one frame the smaller goes first."""
-
-
-@dataclass(frozen=True, eq=False)
-class NewestAnswer:
-    """The finished answer with the newest stamp.
-
-    Args:
-        stamp_ns: simulated capture stamp of its frame.
-        labels: (H, W) uint8.
-    """
-
-    stamp_ns: int
-    labels: Labels
-
-
-class Judge(Protocol):
-    """Who watches a run: told every arrival and every end, in simulated order."""
-
-    def arrived(self, slot: Slot, loaded: Loaded, newest: NewestAnswer | None) -> None:
-        """A frame arrives, or would have; `newest` is what a robot would act on at this instant."""
-
-    def ended(self, result: FrameResult, loaded: Loaded) -> None:
-        """A frame has got its outcome; `loaded` still holds its image and truth."""
-
-
-@dataclass(eq=False)
-class _Task:
-    """A frame between taken and answered."""
-
-    slot: Slot
-    loaded: Loaded
-    frame: Frame
-    taken_ns: int
-    registration: Registration | None = None
-    reason: str = ""
+from stsem.stages.track import Tracker, Tracking
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +35,9 @@ class Machine:
         fuse: the map beside the path; None without one.
         count_decode: whether decoding is a job on the path (`--count-decode`); the work itself is done before.
         reload: loads a frame again that had to wait long; None keeps every waiting frame in memory.
+        tracker: finds the poses; None where the log gives them.
+        pose_on_path: whether an answer needs the pose that `tracker` finds, so that `track` lies on the path.
+        in_background: whether keyframes are segmented beside the path, and answered by prediction.
     """
 
     cores: int
@@ -80,6 +47,18 @@ class Machine:
     fuse: Fuser | None = None
     count_decode: bool = False
     reload: Callable[[int], Loaded] | None = None
+    tracker: Tracker | None = None
+    pose_on_path: bool = False
+    in_background: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """A frame between taken and answered."""
+
+    slot: Slot
+    loaded: Loaded
+    taken_ns: int
 
 
 @dataclass(eq=False)
@@ -103,12 +82,21 @@ class RealTimeRun:
     """
 
     def __init__(self, slots: Sequence[Slot], rule: AnswerRule, machine: Machine, judge: Judge) -> None:
-        self._slots, self._rule, self._machine, self._judge = slots, rule, machine, judge
+        self._slots, self._mailbox, self._judge = slots, machine.mailbox, judge
         self._marks = watermarks(slots)
         self._queue = EventQueue(min((slot.arrival_ns for slot in slots), default=0))
         self._pool = CorePool(self._queue, machine.cores)
+        self._jobs = Jobs(self._pool, machine.costs)
         self._pushed = 0
         self._state = _State(WaitingRoom(machine.reload))
+        self._decoding = Decoding(self._decode if machine.count_decode else None)
+        first = min((slot.index for slot in slots), default=0)
+        self._track = None if machine.tracker is None else TrackWorker(machine.tracker, first, self._start_tracking)
+        network = NetworkJobs(self._jobs, rule, machine.network_cores, machine.fuse, self._track)
+        self.background = Background(network.segment, rule.abandon) if machine.in_background else None
+        """Keyframes beside the path; None in a mode whose answers wait for the network."""
+        on_path = self._track if machine.pose_on_path else None
+        self._path = AnswerPath(self._jobs, rule, self._decoding, on_path, network, self.background)
 
     @property
     def spans(self) -> Sequence[Span]:
@@ -119,6 +107,8 @@ class RealTimeRun:
         """The next frame of the log."""
         slot, mark = self._slots[self._pushed], self._marks[self._pushed]
         self._pushed += 1
+        if self._track is not None and loaded.frame is not None and not slot.missing:
+            self._track.prepare(loaded.frame)
         self._queue.schedule(slot.arrival_ns, Priority.ARRIVAL, lambda: self._arrive(slot, loaded))
         if mark - 1 > self._queue.now_ns:
             self._queue.run_until(mark - 1)
@@ -126,119 +116,58 @@ class RealTimeRun:
     def finish(self, horizon_ns: int) -> None:
         """Let the clock run to `horizon_ns`; whatever is unfinished then is pending."""
         self._queue.run_until(max(horizon_ns, self._queue.now_ns))
-        state = self._state
+        state, pending = self._state, Ending(Outcome.PENDING)
         if state.task is not None:
-            self._end(state.task.slot, state.task.loaded, Outcome.PENDING, taken_ns=state.task.taken_ns)
+            self._end(state.task.slot, state.task.loaded, pending, taken_ns=state.task.taken_ns)
             state.task = None
-        while (index := self._machine.mailbox.take()) is not None:
-            self._end(self._slot(index), state.waiting.pop(index), Outcome.PENDING)
+        while (index := self._mailbox.take()) is not None:
+            self._end(self._slot(index), state.waiting.pop(index), pending)
 
     def _slot(self, index: int) -> Slot:
         return self._slots[index - self._slots[0].index]
 
     def _arrive(self, slot: Slot, loaded: Loaded) -> None:
         self._judge.arrived(slot, loaded, self._state.newest)
-        if loaded.frame is None:
-            self._end(slot, loaded, Outcome.UNDECODABLE, reason="" if loaded.error is None else loaded.error.reason)
-        elif slot.missing:
-            self._end(slot, loaded, Outcome.INCOMPLETE, reason=f"no {' and no '.join(slot.missing)}")
-        else:
+        if self._track is not None:
+            self._track.arrive(slot.index, None if slot.missing else loaded.frame)
+        ending = unusable(slot, loaded)
+        if ending is None:
             self._enqueue(slot, loaded)
+        else:
+            self._end(slot, loaded, ending)
 
     def _enqueue(self, slot: Slot, loaded: Loaded) -> None:
         self._state.waiting.put(loaded)
-        dropped = self._machine.mailbox.put(slot.index)
+        dropped = self._mailbox.put(slot.index)
         if dropped is not None:
-            self._end(self._slot(dropped), self._state.waiting.pop(dropped), Outcome.DROPPED_BUSY)
+            self._end(self._slot(dropped), self._state.waiting.pop(dropped), Ending(Outcome.DROPPED_BUSY))
         self._take()
 
     def _take(self) -> None:
-        if self._state.task is not None or (index := self._machine.mailbox.take()) is None:
+        if self._state.task is not None or (index := self._mailbox.take()) is None:
             return
         loaded = self._state.waiting.pop(index)
         if loaded.frame is None:
             raise ValueError(f"frame {index} has no image and cannot be taken")
-        task = _Task(self._slot(index), loaded, loaded.frame, self._queue.now_ns)
+        task = _Task(self._slot(index), loaded, self._queue.now_ns)
         self._state.task = task
-        if self._machine.count_decode:
-            self._submit(task.frame, "decode", 1, lambda: None, lambda _: self._register(task))
-        else:
-            self._register(task)
+        self._path.answer(loaded.frame, lambda ending: self._answered(task, ending))
 
-    def _register(self, task: _Task) -> None:
-        def choose(registration: Registration | None) -> None:
-            task.registration = registration
-            self._choose(task)
-
-        if self._rule.registers:
-            self._submit(task.frame, "register", 1, lambda: self._rule.register(task.frame), choose)
-        else:
-            choose(None)
-
-    def _choose(self, task: _Task) -> None:
-        reason = self._rule.choose(task.frame, task.registration)
-        if reason is not None:
-            task.reason = reason
-            cores = self._machine.network_cores
-            segment = self._rule.segment
-            self._submit(
-                task.frame, "segment", cores, lambda: segment(task.frame),
-                lambda answer: self._segmented(task, answer),
-            )  # fmt: skip
-        elif self._rule.source is None:
-            self._answer(task, Outcome.NO_SOURCE, None, None)
-        else:
-            source = self._rule.source.index
-            propagate = self._rule.propagate
-            self._submit(
-                task.frame, "propagate", 1, lambda: propagate(task.frame, task.registration),
-                lambda answer: self._answer(task, Outcome.PROPAGATED, answer, source),
-            )  # fmt: skip
-
-    def _segmented(self, task: _Task, answer: Segmentation | None) -> None:
-        if answer is None:
-            task.reason = "no truth for the oracle"
-            self._answer(task, Outcome.NO_SOURCE, None, None)
-            return
-        self._rule.finish(task.frame, answer)
-        fuse = self._machine.fuse
-        if fuse is not None and fuse.can_fuse(task.frame):
-            self._submit(task.frame, "fuse", 1, lambda: fuse(task.frame, answer), lambda _: None)
-        self._answer(task, Outcome.SEGMENTED, answer, task.slot.index)
-
-    def _answer(self, task: _Task, outcome: Outcome, answer: Segmentation | None, source: int | None) -> None:
-        self._state.task = None
-        newest = self._state.newest
-        if answer is not None and (newest is None or task.slot.stamp_ns >= newest.stamp_ns):
-            self._state.newest = NewestAnswer(task.slot.stamp_ns, answer.labels)
-        self._end(
-            task.slot, task.loaded, outcome, taken_ns=task.taken_ns, answered_ns=self._queue.now_ns, answer=answer,
-            keyframe=source, reason=task.reason,
-        )  # fmt: skip
+    def _answered(self, task: _Task, ending: Ending) -> None:
+        state, answer = self._state, ending.answer
+        state.task = None
+        if answer is not None and (state.newest is None or task.slot.stamp_ns >= state.newest.stamp_ns):
+            state.newest = NewestAnswer(task.slot.stamp_ns, answer.labels)
+        self._end(task.slot, task.loaded, ending, taken_ns=task.taken_ns)
         self._take()
 
-    def _end(
-        self, slot: Slot, loaded: Loaded, outcome: Outcome, *, taken_ns: int | None = None,
-        answered_ns: int | None = None, answer: Segmentation | None = None, keyframe: int | None = None,
-        reason: str = "",
-    ) -> None:  # fmt: skip
-        result = FrameResult(
-            index=slot.index, stamp_ns=slot.stamp_ns, arrival_ns=slot.arrival_ns, taken_ns=taken_ns,
-            answered_ns=answered_ns if outcome.is_answer else None, outcome=outcome, keyframe=keyframe, reason=reason,
-        )  # fmt: skip
-        self._judge.ended(with_answer(result, answer), loaded)
+    def _end(self, slot: Slot, loaded: Loaded, ending: Ending, *, taken_ns: int | None = None) -> None:
+        now_ns = self._queue.now_ns
+        result = ending.result(slot, arrival_ns=slot.arrival_ns, taken_ns=taken_ns, ended_ns=now_ns)
+        self._judge.ended(result, loaded)
 
-    def _submit(
-        self, frame: Frame, stage: str, cores: int, work: Callable[[], T], on_finish: Callable[[T], None]
-    ) -> None:
-        costs = self._machine.costs
-        self._pool.submit(
-            Job(
-                frame.index,
-                stage,
-                ORDER[stage],
-                cores,
-                lambda: costs.run(frame.stamp_ns, stage, cores, work),
-                on_finish,
-            )
-        )
+    def _decode(self, frame: Frame, then: Callable[[], None]) -> None:
+        self._jobs.submit(frame, "decode", 1, lambda: None, lambda _: then())
+
+    def _start_tracking(self, frame: Frame, work: Callable[[], Tracking], then: Callable[[Tracking], None]) -> None:
+        self._decoding.before(frame, lambda: self._jobs.submit(frame, "track", 1, work, then))

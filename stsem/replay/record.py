@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from stsem.classes import NO_LABEL, ClassSet, Labels
+from stsem.classes import NO_LABEL, Bools, ClassSet, Labels
 from stsem.frame import Frame
 from stsem.log.log import Loaded
 from stsem.metrics.calibration import CalibrationMeter
 from stsem.metrics.consistency import ConsistencyMeter
 from stsem.metrics.scorecard import Scorecard
-from stsem.replay.realtime import NewestAnswer
+from stsem.replay.judging import NewestAnswer
 from stsem.replay.schedule import Slot
 from stsem.replay.unsure import Unsurest
 from stsem.result import FrameResult, Outcome, Results
@@ -61,7 +61,7 @@ class Record:
 
         Without a clock, a frame that cannot be decoded or completed was never asked about, and is not judged.
         """
-        result = replace(result, coverage=_coverage(result.labels))
+        result = replace(result, coverage=_coverage(result.labels), covered_share=_share(result.covered))
         never_came = result.arrival_ns is None and result.outcome in (Outcome.UNDECODABLE, Outcome.INCOMPLETE)
         if self.scorecard is not None and loaded.truth is not None and not never_came:
             self._judge(self.scorecard, result, loaded.truth)
@@ -86,6 +86,7 @@ class Record:
             result.index, slot.log_stamp_ns, truth, result.labels, outcome=result.outcome,
             distance=None if source is None else slot.index - source.index,
             distance_ns=None if source is None else slot.log_stamp_ns - source.log_stamp_ns,
+            covered=result.covered,
         )  # fmt: skip
         if self.calibration is not None and result.labels is not None and result.confidence is not None:
             self.calibration.update(
@@ -106,6 +107,10 @@ def scorecard_for(classes: ClassSet, known: Labels | None) -> Scorecard:
     """
     mask = None if known is None else np.isin(np.arange(len(classes)), known[known != NO_LABEL])
     return Scorecard(classes, mask)
+
+
+def _share(covered: Bools | None) -> float | None:
+    return None if covered is None else int(np.count_nonzero(covered)) / max(1, covered.size)
 
 
 def _coverage(labels: Labels | None) -> float | None:

@@ -5,8 +5,8 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from stsem.document.accuracy import Coverage, Loss
-from stsem.document.schema import MapScore, Run, TrajectoryScore
+from stsem.document.accuracy import Coverage, Loss, Score
+from stsem.document.schema import MapScore, Run
 from stsem.document.timing import Latency, Throughput
 from stsem.log.log import Log
 from stsem.log.plan import NEEDS
@@ -15,7 +15,8 @@ from stsem.metrics.loss import split
 from stsem.metrics.outcomes import count_outcomes
 from stsem.metrics.scorecard import Accuracy
 from stsem.metrics.throughput import throughput
-from stsem.replay import accuracy, timing
+from stsem.replay import accuracy, timing, trajectories
+from stsem.replay.beside import background
 from stsem.replay.build import Model
 from stsem.replay.calibration import calibration, error_detection
 from stsem.replay.config import RunConfig
@@ -23,7 +24,7 @@ from stsem.replay.costing import Costing
 from stsem.replay.engine import Replayed
 from stsem.replay.lanes import ModeRun
 from stsem.replay.record import Record
-from stsem.result import Outcome, Span
+from stsem.result import ANSWER_STAGES, Span
 
 NO_CLOCK = "--clock offline"
 NO_OFFLINE = "--no-offline"
@@ -87,6 +88,8 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
     record = run.record
     counts = count_outcomes((r.outcome for r in record.results), len(context.replayed.slots))
     late, fast, inside = _timing(context, run)
+    posing = context.replayed.posing
+    moved = trajectories.score(context.log, posing, run.tracker, _offline_by_poses(context, found))
     own = None if found.clocked is None else found.clocked.own
     streaming = None if found.clocked is None else found.clocked.streaming
     offline = None if found.offline is None else found.offline.own
@@ -97,13 +100,14 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
         clock=config.clock,
         frames=len(context.replayed.slots),
         outcomes=timing.outcomes({str(outcome): n for outcome, n in counts.items()}),
-        keyframes=tuple(r.index for r in record.results if r.outcome is Outcome.SEGMENTED),
-        keyframe_reasons=dict(
-            sorted(Counter(r.reason for r in record.results if r.outcome is Outcome.SEGMENTED).items())
-        ),
+        keyframes=tuple(run.keyframes),
+        keyframe_reasons=dict(sorted(Counter(run.keyframes.values()).items())),
+        background=background(context.log, run, found.clocked),
+        covered=_covered(record),
+        remarks=dict(sorted(Counter(r.remark for r in record.results if r.remark).items())),
         keyframes_moved=0 if run.rule is None else run.rule.moved,
         stages_inside=inside,
-        stages_disabled=_disabled(context, run, record),
+        stages_disabled=_disabled(context, run),
         coverage=_coverage(context, found),
         offline=accuracy.score(offline, classes),
         delivered=accuracy.score(own, classes),
@@ -119,19 +123,37 @@ def part(context: Context, found: Found, base: Found | None) -> Run:
         ),
         latency_ms=late,
         throughput=fast,
-        trajectory=_trajectory(context),
+        trajectory=moved,
         map=None
         if run.cloud is None
         else MapScore(points=len(run.cloud), voxels=len(run.cloud), points_left_out=run.cloud.left_out),
-        not_measured=_why_not(context, found),
+        not_measured=_why_not(context, found) | trajectories.why_not(context.log, posing, moved),
     )
+
+
+def _offline_by_poses(context: Context, found: Found) -> dict[str, Score | None]:
+    """Source of poses -> the offline score with them; empty where predictions do not depend on poses."""
+    record, offline = found.run.by_log, found.offline
+    if record is None or record.scorecard is None or offline is None:
+        return {}
+    classes = context.model.classes
+    return {
+        "slam": accuracy.score(offline.own, classes), "log": accuracy.score(record.scorecard.compute().own, classes),
+    }  # fmt: skip
+
+
+def _covered(record: Record) -> float | None:
+    """Mean share of the pixels of predicted answers that rest on evidence; None where nobody says."""
+    shares = [r.covered_share for r in record.results if r.covered_share is not None]
+    return sum(shares) / len(shares) if shares else None
 
 
 def _timing(context: Context, run: ModeRun) -> tuple[Latency | None, Throughput | None, tuple[str, ...]]:
     if run.real_time is None:
         return None, None, ()
     config, results = context.config, run.real_time.results
-    late = latency(results, run.spans, distinct_samples=_distinct_samples(context, run))
+    path = _path(run)
+    late = latency(results, run.spans, distinct_samples=_distinct_samples(context, run), answer_stages=path)
     deadline = timing.deadline_ns(config.deadline_ms, context.log.period_ns, config.exact_rate)
     fast = throughput(
         results, run.spans, cores=config.cores, deadline_ns=deadline, rate=float(config.exact_rate)
@@ -141,6 +163,12 @@ def _timing(context: Context, run: ModeRun) -> tuple[Latency | None, Throughput 
         timing.throughput(fast, deadline, context.sustainable_hz.get(run.mode.name)),
         timing.stages_inside(late.inside),
     )
+
+
+def _path(run: ModeRun) -> tuple[str, ...]:
+    """The stages that an answer may wait for."""
+    inside = ANSWER_STAGES if run.background is None else tuple(s for s in ANSWER_STAGES if s != "segment")
+    return (*inside, "track") if run.pose_on_path else inside
 
 
 def _distinct_samples(context: Context, run: ModeRun) -> int | None:
@@ -163,13 +191,18 @@ def _distinct_durations(spans: Iterable[Span]) -> int:
     return len(set(slowest))
 
 
-def _disabled(context: Context, run: ModeRun, record: Record) -> dict[str, int]:
+def _disabled(context: Context, run: ModeRun) -> dict[str, int]:
     """Keyframes that `fuse` could not use, because an optional channel is missing for them."""
     if run.cloud is None:
         return {}
-    plans = context.log.plans
-    lacking = sum(bool(plans[r.index].missing(NEEDS)) for r in record.results if r.outcome is Outcome.SEGMENTED)
+    lacking = sum(not fusable(context, run, index) for index in run.keyframes)
     return {"fuse": lacking} if lacking else {}
+
+
+def fusable(context: Context, run: ModeRun, index: int) -> bool:
+    """Whether the keyframe with a log index has depth and a pose."""
+    missing = context.log.plans[index].missing(NEEDS)
+    return not missing if run.tracker is None else "depth" not in missing and run.tracker.anchor(index) is not None
 
 
 def _coverage(context: Context, found: Found) -> Coverage:
@@ -207,14 +240,6 @@ def _why_no_part(context: Context, name: str, base: Found | None) -> str:
     return "a score that it is made of was not measured"
 
 
-def _trajectory(context: Context) -> TrajectoryScore | None:
-    plans, trajectory = context.log.plans, context.log.trajectory
-    if trajectory is None or not plans:
-        return None
-    posed = sum(plan.pose_log_ns is not None for plan in plans)
-    return TrajectoryScore(pose=context.config.pose, tracked_share=posed / len(plans), n=0)
-
-
 def _why_not(context: Context, found: Found) -> dict[str, str]:
     config, why = context.config, {}
     for name, accuracies, absent in (
@@ -239,10 +264,7 @@ def _why_not(context: Context, found: Found) -> dict[str, str]:
         why["map"] = (
             "--map off"
             if not config.map
-            else "the log lacks depth, poses, or intrinsics of a camera without distortion"
+            else context.replayed.posing.off
+            or "the log lacks depth, poses, or intrinsics of a camera without distortion"
         )
-    if context.log.trajectory is None:
-        why["trajectory"] = "the log has no poses"
-    else:
-        why["trajectory.ate_rmse_m"] = "the log's poses are used as they are"
     return why

@@ -7,7 +7,7 @@ from stsem.document import timing as doc
 from stsem.metrics.durations import Summary
 from stsem.metrics.latency import Latency
 from stsem.metrics.throughput import Throughput
-from stsem.result import ANSWER_STAGES
+from stsem.result import STAGES
 
 
 def distribution(found: Summary | None) -> doc.Distribution:
@@ -56,4 +56,4 @@ def outcomes(counts: dict[str, int]) -> doc.Outcomes:
 
 def stages_inside(names: Sequence[str]) -> tuple[str, ...]:
     """Stages that the latency contains, in pipeline order."""
-    return tuple(stage for stage in ANSWER_STAGES if stage in names)
+    return tuple(stage for stage in STAGES if stage in names)

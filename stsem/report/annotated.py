@@ -32,7 +32,7 @@ _ANSWER_SCHEMA = {
     "type": "object",
     "properties": {
         "frame": {"type": "integer"}, "outcome": {"type": "string"}, "keyframe": {"type": ["integer", "null"]},
-        "reason": {"type": "string"}, "latency_ms": {"type": ["number", "null"]},
+        "reason": {"type": "string"}, "remark": {"type": "string"}, "latency_ms": {"type": ["number", "null"]},
         "coverage": {"type": ["number", "null"]},
     },
 }  # fmt: skip
@@ -186,7 +186,7 @@ def _facts(result: FrameResult) -> dict[str, Any]:
         latency = (result.answered_ns - result.arrival_ns) / 1e6
     return {
         "frame": result.index, "outcome": str(result.outcome), "keyframe": result.keyframe, "reason": result.reason,
-        "latency_ms": latency, "coverage": result.coverage,
+        "remark": result.remark, "latency_ms": latency, "coverage": result.coverage,
     }  # fmt: skip
 
 

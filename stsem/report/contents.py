@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from stsem.document.schema import Document
 from stsem.report.outline import Figure, Outline, Section, Text
-from stsem.report.sections import accuracy, calibration, headline, origin, timing
+from stsem.report.sections import accuracy, calibration, headline, origin, space, timing
 
 _Maker = Callable[[Document], Section | None]
 _RESULTS: tuple[_Maker, ...] = (
@@ -12,7 +12,7 @@ _RESULTS: tuple[_Maker, ...] = (
     timing.outcomes_section, accuracy.classes_section, calibration.calibration_section,
 )  # fmt: skip
 _BASIS: tuple[_Maker, ...] = (
-    origin.space_section, origin.unmeasured_section, origin.input_section, origin.identity_section,
+    space.space_section, origin.unmeasured_section, origin.input_section, origin.identity_section,
     origin.reproduce_section,
 )  # fmt: skip
 

@@ -51,14 +51,16 @@ def _record(
     source = result.keyframe
     record = {
         "mode": row.mode, "frame": result.index, "outcome": str(result.outcome), "reason": result.reason,
-        "keyframe": source, "distance_frames": None if source is None else result.index - source,
+        "remark": result.remark, "keyframe": source,
+        "distance_frames": None if source is None else result.index - source,
         "distance_ns": None if source is None else row.log_stamp_ns - stamps[source],
         "log_stamp_ns": row.log_stamp_ns, "stamp_ns": result.stamp_ns, "arrival_ns": result.arrival_ns,
         "taken_ns": result.taken_ns, "answered_ns": result.answered_ns, "latency_from_arrival_ns": latency,
         "latency_from_stamp_ns": None if result.answered_ns is None else result.answered_ns - result.stamp_ns,
         "waiting_ns": None if latency is None else latency - sum(row.service_ns(stage) or 0 for stage in inside),
-        "labelled_share": result.coverage, "offline_keyframe": row.offline_keyframe,
-        "offline_pixel_accuracy": row.offline, "delivered_pixel_accuracy": row.delivered,
+        "labelled_share": result.coverage, "covered_share": result.covered_share,
+        "offline_keyframe": row.offline_keyframe, "offline_pixel_accuracy": row.offline,
+        "delivered_pixel_accuracy": row.delivered,
         "streaming_pixel_accuracy": row.streaming,
     }  # fmt: skip
     for stage in stages:
@@ -69,8 +71,9 @@ def _record(
 
 def _record_columns(stages: tuple[str, ...]) -> tuple[str, ...]:
     return (
-        "mode", "frame", "outcome", "reason", "keyframe", "distance_frames", "distance_ns", "log_stamp_ns", "stamp_ns",
-        "arrival_ns", "taken_ns", "answered_ns", "latency_from_arrival_ns", "latency_from_stamp_ns", "waiting_ns",
-        "labelled_share", "offline_keyframe", "offline_pixel_accuracy", "delivered_pixel_accuracy",
-        "streaming_pixel_accuracy", *(f"{stage}_{kind}_ns" for stage in stages for kind in ("waiting", "service")),
+        "mode", "frame", "outcome", "reason", "remark", "keyframe", "distance_frames", "distance_ns", "log_stamp_ns",
+        "stamp_ns", "arrival_ns", "taken_ns", "answered_ns", "latency_from_arrival_ns", "latency_from_stamp_ns",
+        "waiting_ns", "labelled_share", "covered_share", "offline_keyframe", "offline_pixel_accuracy",
+        "delivered_pixel_accuracy", "streaming_pixel_accuracy",
+        *(f"{stage}_{kind}_ns" for stage in stages for kind in ("waiting", "service")),
     )  # fmt: skip

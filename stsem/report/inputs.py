@@ -7,6 +7,7 @@ from pathlib import Path
 from stsem.classes import ClassSet, Labels
 from stsem.document.schema import Document
 from stsem.frame import Image
+from stsem.pose import Trajectory
 from stsem.result import FrameResult
 from stsem.uncertainty import Confidence, Uncertainty
 
@@ -103,6 +104,7 @@ class ReportInputs:
         trace: writes trace.json to a path; None without a clock.
         answer_classes: classes of the answers where the log has no class table; None where it has.
         trajectory: pieces of trajectory.txt; None without poses.
+        paths: source of poses (`log`, `slam`) -> its trajectory, all in one world; empty where there is only the log's.
         point_cloud: the finished map.ply, copied into the folder; None without a map.
         annotated: the finished annotated.mcap, copied into the folder; None without `--annotate`.
         plots: whether pictures are drawn (`--no-plots`).
@@ -115,6 +117,7 @@ class ReportInputs:
     unsure: UnsureFrame | None = None
     trace: Callable[[Path], None] | None = None
     trajectory: Iterable[bytes] | None = None
+    paths: Mapping[str, Trajectory] = field(default_factory=dict)
     answer_classes: ClassSet | None = None
     point_cloud: Path | None = None
     annotated: Path | None = None

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from stsem.document.accuracy import Score
 from stsem.document.part import Part
-from stsem.document.schema import ComparisonRow, Run
+from stsem.document.schema import Comparison, ComparisonRow, Document, Run
 from stsem.document.timing import Distribution, Latency, Throughput
 from stsem.report.wording import NONE, NOT_MEASURED, meaning, number, percent, percentile, points, signed
 
@@ -87,6 +87,11 @@ def shown(run: Run, path: str) -> str:
         return NOT_MEASURED
     metric = METRICS.get(path)
     return percent(found) if metric and metric.unit == "fraction" else number(found, 2 if path.endswith("hz") else 1)
+
+
+def comparisons(document: Document) -> tuple[Comparison, ...]:
+    """The first mode against each further one."""
+    return (*((document.comparison,) if document.comparison else ()), *document.more_comparisons)
 
 
 def row_name(row: ComparisonRow) -> str:

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from tabulate import tabulate
 
-from stsem.document.schema import Document, Run
-from stsem.report.metrics import METRICS, row_delta, shown
+from stsem.document.schema import Comparison, Document, Run
+from stsem.report.metrics import METRICS, comparisons, row_delta, shown
 from stsem.report.wording import NOT_MEASURED
 
 _PATHS = ("offline.miou", "streaming.miou", "offline.pixel_accuracy", "latency_ms.from_arrival.p50",
@@ -13,13 +13,14 @@ _PATHS = ("offline.miou", "streaming.miou", "offline.pixel_accuracy", "latency_m
 
 
 def closing_table(document: Document) -> str:
-    """One column per mode as plain text, then the paired difference, and the basis of the numbers below."""
+    """One column per mode as plain text, then the paired differences, and the basis of the numbers below."""
+    compared = comparisons(document)
     headers = ["", *(run.mode for run in document.runs)]
     rows = [[METRICS[path].name, *(_shown(document, run, path) for run in document.runs)] for path in _PATHS]
     rows += [[name, *(str(get(run)) for run in document.runs)] for name, get in _COUNTS.items()]
-    if document.comparison:
-        headers.append("difference [95 % interval]")
-        deltas = {row.metric: row_delta(row) for row in document.comparison.rows}
+    for comparison in compared:
+        headers.append(_difference(comparison) if len(compared) > 1 else "difference [95 % interval]")
+        deltas = {row.metric: row_delta(row) for row in comparison.rows}
         for path, row in zip(_PATHS, rows, strict=False):
             row.append(deltas.get(path, ""))
     align = ("left", *("right" for _ in headers[1:]))
@@ -48,6 +49,11 @@ def basis(document: Document) -> str:
     if all(run.latency_ms is None for run in document.runs):
         return f"{accuracy} Offline: no clock, so no latency."
     return f"{accuracy} Latency from arrival, on the simulated clock."
+
+
+def _difference(comparison: Comparison) -> str:
+    """The head of one of several columns of differences, in lines."""
+    return f"{comparison.other}\n− {comparison.base}\n[95 % interval]"
 
 
 def _shown(document: Document, run: Run, path: str) -> str:

@@ -1,1 +1,1 @@
-"""The steps of the paper's pipeline, one file each: register, select, segment | propagate, and fuse beside them."""
+"""The steps of the pipeline, one file each: register, select, segment | propagate; track and fuse beside them."""

@@ -1,78 +1,39 @@
-"""Propagate: labels for a frame from a finished keyframe. One more method is one class and one table row."""
+"""Propagate: labels for a frame from finished keyframes. One more method is one file and one row of the table."""
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Protocol
+from dataclasses import dataclass
 
-import numpy as np
-
-from stsem.frame import Frame, Segmentation
-from stsem.geometry.homography import Homography
-from stsem.geometry.warp import warp_confidence, warp_labels, warp_onto
-from stsem.stages.keyframe import Keyframe
-
-
-class Propagation(Protocol):
-    """Predicts labels from a keyframe."""
-
-    @property
-    def needs_homography(self) -> bool:
-        """Whether `homography` must be estimated for it."""
-
-    def propagate(self, keyframe: Keyframe, frame: Frame, homography: Homography | None) -> Segmentation:
-        """Labels for `frame` at the size of its image; NO_LABEL where the method has nothing to say.
-
-        The confidence of a label moves with it; maps of uncertainty do not: they are about the keyframe.
-
-        Args:
-            keyframe: a finished keyframe.
-            frame: the frame to label.
-            homography: from `keyframe` to `frame`; None if there is no trustworthy one.
-        """
+from stsem.classes import ClassSet
+from stsem.stages.propagation.depth import DepthWarp
+from stsem.stages.propagation.flow import Flow
+from stsem.stages.propagation.hold import Hold
+from stsem.stages.propagation.homography import ChainedHomography, HomographyWarp
+from stsem.stages.propagation.method import Needs, Propagation
 
 
-class Hold:
-    """Copies the keyframe's labels and their confidence: what not predicting at all scores."""
+@dataclass(frozen=True)
+class Method:
+    """A row of the table.
 
-    needs_homography = False
-
-    def propagate(self, keyframe: Keyframe, frame: Frame, homography: Homography | None) -> Segmentation:
-        """The keyframe's labels as they are, by nearest neighbour if the image size changed."""
-        held = replace(keyframe.segmentation, uncertainty=None)
-        if held.labels.shape == frame.image.shape[:2]:
-            return held
-        H = _stretch(held.labels.shape, frame.size)
-        confidence = None if held.confidence is None else warp_confidence(held.confidence, H, frame.size)
-        return Segmentation(warp_labels(held.labels, H, frame.size), confidence)
-
-
-class HomographyWarp:
-    """Warps the keyframe's labels by one homography (equation 2); what it does not cover is copied in place.
-
-    A copied border is right more often than one without a label. Without a trustworthy homography the whole keyframe
-    is copied.
+    Args:
+        needs: what it asks of others.
+        make: a method for one run, from the classes of the labels and the run's seed.
+        covers: whether it can tell what it covers.
     """
 
-    needs_homography = True
-
-    def propagate(self, keyframe: Keyframe, frame: Frame, homography: Homography | None) -> Segmentation:
-        """Warped labels, holes filled from the same pixel of the keyframe."""
-        held = Hold().propagate(keyframe, frame, None)
-        if homography is None:
-            return held
-        labels, confidence = keyframe.segmentation.labels, keyframe.segmentation.confidence
-        if held.confidence is None or confidence is None:
-            return Segmentation(warp_onto(held.labels, labels, homography.H))
-        return Segmentation(
-            warp_onto(held.labels, labels, homography.H), warp_onto(held.confidence, confidence, homography.H)
-        )
+    needs: Needs
+    make: Callable[[ClassSet, int], Propagation]
+    covers: bool = True
 
 
-PROPAGATIONS: dict[str, Callable[[], Propagation]] = {"hold": Hold, "homography": HomographyWarp}
-"""Method on the command line -> its factory."""
+AUTO, IN_SPACE, IN_THE_IMAGE = "auto", "depth", "flow"
+"""What takes the best method, and which that is with and without depth, poses and a camera (docs/keyframes.md)."""
 
-
-def _stretch(shape: tuple[int, ...], size: tuple[int, int]) -> np.ndarray:
-    """(3, 3) homography that resizes an image of `shape` (H, W) to `size` (W, H), pixel centres at integers."""
-    sx, sy = size[0] / shape[1], size[1] / shape[0]
-    return np.array([[sx, 0, (sx - 1) / 2], [0, sy, (sy - 1) / 2], [0, 0, 1]])
+PROPAGATIONS: dict[str, Method] = {
+    "hold": Method(Hold.needs, lambda classes, seed: Hold(), covers=False),
+    "homography": Method(HomographyWarp.needs, lambda classes, seed: HomographyWarp(seed)),
+    "homography-chained": Method(ChainedHomography.needs, lambda classes, seed: ChainedHomography(seed)),
+    "flow": Method(Flow.needs, lambda classes, seed: Flow()),
+    "depth": Method(DepthWarp.needs, lambda classes, seed: DepthWarp(classes)),
+}
+"""Method on the command line -> its row."""

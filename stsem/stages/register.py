@@ -1,6 +1,11 @@
-"""Register: how the last selected keyframe maps onto this frame (equation 2)."""
+"""Register: what relates this frame to those before it: points, homographies (equation 2), and what a method follows.
 
-from dataclasses import dataclass
+A frame is registered to the last selected keyframe if the policy tells from it how far the image moved, and to the one
+that its labels would come from if the method warps them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from stsem import chance
@@ -10,41 +15,82 @@ from stsem.geometry.homography import Homography, estimate
 
 
 @dataclass(frozen=True, eq=False)
+class Anchor:
+    """A keyframe to register to: its log index and the points of its image."""
+
+    index: int
+    features: Features
+
+
+@dataclass(frozen=True, eq=False)
 class Registration:
-    """Args:
-    features: of this frame, kept in case it becomes a keyframe.
-    homography: keyframe pixels to this frame's; None for the first frame, or if none can be trusted.
+    """What relates a frame to those before it.
+
+    Args:
+        features: of this frame, kept in case it becomes a keyframe; None if nobody looks at any.
+        homographies: log index of a keyframe -> its pixels to this frame's; None if none can be trusted.
+        coverage: share of the pixels that keyframes cover, foretold; None if nobody asks or knows.
     """
 
-    features: Features
-    homography: Homography | None
+    features: Features | None = None
+    homographies: Mapping[int, Homography | None] = field(default_factory=dict)
+    coverage: float | None = None
 
 
 class Registering(Protocol):
-    """Registers a frame to a keyframe."""
+    """Registers a frame to keyframes."""
 
-    def __call__(self, frame: Frame, keyframe: Features | None, keyframe_index: int | None) -> Registration:
-        """Features of `frame` and, if there is a keyframe, its homography to `frame`."""
+    def __call__(self, frame: Frame, anchors: Sequence[Anchor]) -> Registration:
+        """Features of `frame`, and the homography to it from each of the `anchors`."""
 
 
-@dataclass(frozen=True)
+class Follower(Protocol):
+    """Whoever must see every frame that is taken."""
+
+    def see(self, frame: Frame, registration: Registration) -> None:
+        """The next frame taken."""
+
+
+class Foreteller(Protocol):
+    """Whoever knows how much of a frame keyframes cover."""
+
+    def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
+        """The share, 0..1, of the frame taken last; None if it cannot tell."""
+
+
+@dataclass(frozen=True, eq=False)
 class Register:
-    """Registers frames to a keyframe by ORB features and a robust homography.
+    """Registers frames by ORB features and robust homographies, and shows them to who follows the image.
 
     Args:
         seed: of the robust estimation; each pair of frames draws for itself, so call order is irrelevant.
+        points: whether anybody looks at features and homographies.
+        follower: sees every frame; None if nobody does.
+        foreteller: tells the coverage of every frame; None if nobody asks.
     """
 
     seed: int
+    points: bool = True
+    follower: Follower | None = None
+    foreteller: Foreteller | None = None
 
-    def __call__(self, frame: Frame, keyframe: Features | None, keyframe_index: int | None) -> Registration:
-        """Features of `frame` and, if there is a keyframe, its homography to `frame`."""
+    def __call__(self, frame: Frame, anchors: Sequence[Anchor]) -> Registration:
+        """Features of `frame`, and the homography to it from each of the `anchors`."""
+        registration = self._registered(frame, anchors) if self.points else Registration()
+        if self.follower is not None:
+            self.follower.see(frame, registration)
+        if self.foreteller is not None:
+            registration = replace(registration, coverage=self.foreteller.expected_coverage(frame, registration))
+        return registration
+
+    def _registered(self, frame: Frame, anchors: Sequence[Anchor]) -> Registration:
         features = extract(frame.image)
-        if keyframe is None or keyframe_index is None:
-            return Registration(features, None)
-        return Registration(
-            features, estimate(keyframe, features, seed=pair_seed(self.seed, keyframe_index, frame.index))
-        )
+        return Registration(features, {a.index: between(a, frame.index, features, self.seed) for a in anchors})
+
+
+def between(anchor: Anchor, index: int, features: Features, seed: int) -> Homography | None:
+    """The homography from `anchor` to the frame `index` with `features`; None if none can be trusted."""
+    return estimate(anchor.features, features, seed=pair_seed(seed, anchor.index, index))
 
 
 def pair_seed(seed: int, keyframe_index: int, index: int) -> int:

@@ -83,7 +83,7 @@ def render_log(
         rate_hz: frames per second.
         length_s: seconds.
         noise: depth noise, `kinect` or `none`.
-        speed: `steady` or `varying`.
+        speed: `steady`, `searching` or `varying`.
         label_every: truth for every so many frames.
         progress: called with (frames done, frames).
 

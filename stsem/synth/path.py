@@ -29,28 +29,34 @@ class Profile:
         pause: chance that a stretch of about two seconds is a pause.
         turn_rate: fastest turn, rad/s.
         glance_s: how long it looks at one thing, least and most.
+        ahead: chance that it looks along the way for as long, and not at a thing.
+        aside: what it glances at is less than this off where it looks now, rad.
     """
 
     speeds: tuple[float, float]
     pause: float
     turn_rate: float
     glance_s: tuple[float, float]
+    ahead: float
+    aside: float
 
 
+_WIDE = float(np.radians(120))
 PROFILES = {
-    "steady": Profile((0.5, 0.5), 0.0, float(np.radians(45)), (1.6, 2.6)),
-    "varying": Profile((0.35, 0.85), 0.3, float(np.radians(90)), (0.9, 1.8)),
+    "steady": Profile((0.5, 0.5), 0.0, float(np.radians(45)), (3.0, 5.0), 2 / 3, _WIDE / 2),
+    "searching": Profile((0.5, 0.5), 0.0, float(np.radians(45)), (1.6, 2.6), 1 / 6, _WIDE),
+    "varying": Profile((0.35, 0.85), 0.3, float(np.radians(90)), (0.9, 1.8), 1 / 6, _WIDE),
 }
 
 
 def profile(name: str) -> Profile:
-    """The speed profile `steady` or `varying`.
+    """The speed profile `steady`, `searching` or `varying`.
 
     Raises:
         UsageError: there is no such profile.
     """
     if name not in PROFILES:
-        raise UsageError(f"There is no speed profile {name!r}; give {' or '.join(PROFILES)}.")
+        raise UsageError(f"There is no speed profile {name!r}; give {', '.join(PROFILES)}.")
     return PROFILES[name]
 
 
@@ -170,7 +176,7 @@ def _gaze(office: Office, seed: int, places: F64, ahead: F64, moves: Profile) ->
     stiffness = 5.0
     for i, (x, y) in enumerate(places):
         if i >= until:
-            target = _choose(office, seen, (float(x), float(y)), yaw, rng)
+            target = _choose(office, seen, (float(x), float(y)), yaw, rng, moves)
             until = i + int(rng.uniform(*moves.glance_s) / STEP_S)
         wanted, wanted_pitch = _towards(target, (float(x), float(y)), ahead[i])
         turn = (wanted - yaw + np.pi) % (2 * np.pi) - np.pi
@@ -184,17 +190,18 @@ def _gaze(office: Office, seed: int, places: F64, ahead: F64, moves: Profile) ->
 
 
 def _choose(
-    office: Office, seen: dict[int, int], place: tuple[float, float], yaw: float, rng: np.random.Generator
-) -> Target | None:
-    """Something of this room 1 to 4.5 m away and less than 120 degrees off; None (look ahead) one time in six."""
+    office: Office, seen: dict[int, int], place: tuple[float, float], yaw: float, rng: np.random.Generator,
+    moves: Profile,
+) -> Target | None:  # fmt: skip
+    """Something of this room 1 to 4.5 m away and not too far off to the side; None: look ahead."""
     area = area_of(office.plan, *place)
     near = []
     for target in office.furnishing.targets:
         dx, dy = target.point[0] - place[0], target.point[1] - place[1]
         off = abs((np.arctan2(dy, dx) - yaw + np.pi) % (2 * np.pi) - np.pi)
-        if target.room == area and 1.0 < np.hypot(dx, dy) < 4.5 and off < np.radians(120):
+        if target.room == area and 1.0 < np.hypot(dx, dy) < 4.5 and off < moves.aside:
             near.append(target)
-    if not near or rng.random() < 1 / 6:
+    if not near or rng.random() < moves.ahead:
         return None
     least = min(seen.get(t.label, 0) for t in near)
     pool = [t for t in near if seen.get(t.label, 0) == least]

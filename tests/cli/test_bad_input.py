@@ -77,7 +77,7 @@ def test_no_log(replay: Cli, home: Path, make: Callable[[Path], Path], words: li
         (["--set", "map=2"], 2, ["map", "on or off", "2"]),
         (["--precision", "f16"], 2, ["precision", "f32", "f16"]),
         (["--precision", "bf16"], 2, ["bf16", "onnxruntime", "--backend openvino"]),
-        (["--pose", "slam"], 2, ["pose", "log", "slam"]),
+        (["--pose", "gps"], 2, ["pose", "log", "slam", "gps"]),
         (["--propagation", "magic"], 2, ["magic", "homography"]),
         (["--keyframes", "every:0"], 2, ["every:0", "every:N"]),
         (["--keyframes", "every:" + "9" * 30], 2, ["keyframe policy"]),

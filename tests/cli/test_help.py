@@ -2,21 +2,24 @@
 
 import re
 import sys
+from typing import get_args
 
 import pytest
 
 from stsem.cli import main
 from stsem.inference.backends import BACKENDS, PRECISIONS
+from stsem.replay.config import PoseSource
 from stsem.replay.modes import MODES
-from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.propagate import AUTO, PROPAGATIONS
 from stsem.stages.select import POLICIES
 
 CHOICES = {
     "--mode": list(MODES),
-    "--propagation": list(PROPAGATIONS),
+    "--propagation": [AUTO, *PROPAGATIONS],
     "--keyframes": [spelling for spelling, _ in POLICIES.values()],
     "--backend": list(BACKENDS),
     "--precision": list(PRECISIONS),
+    "--pose": list(get_args(PoseSource)),
 }
 
 

@@ -54,7 +54,7 @@ def test_costs_measure_and_scale(cli: Cli, home: Path, tiny_log: Path, monkeypat
     ran = cli("costs", "measure", tiny_log, "--out", "here.json", "--samples", "3", "--seconds", "5")
     assert ran.code == 0
     here = load_profile(home / "here.json")
-    stages = {"segment@1", "segment@2", "register@1", "propagate@1", "decode@1", "fuse@1"}
+    stages = {"segment@1", "segment@2", "register@1", "propagate@1", "decode@1", "fuse@1", "track@1"}
     assert set(here.samples_ns) == stages
     assert all(len(samples) <= 3 for samples in here.samples_ns.values())
     assert cli("costs", "scale", "here.json", "--out", "slow.json", "--by", "10", "--by", "fuse=1/2").code == 0

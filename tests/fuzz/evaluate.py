@@ -27,7 +27,8 @@ from stsem.replay.build import build_model
 from stsem.replay.config import RunConfig
 from stsem.replay.costing import costing
 from stsem.replay.documents import build_document
-from stsem.replay.engine import can_map, replay_log
+from stsem.replay.engine import replay_log
+from stsem.replay.posing import can_map
 from stsem.replay.runs import Context
 from stsem.sim.profile import CostProfile
 

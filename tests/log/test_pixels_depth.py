@@ -55,6 +55,13 @@ def test_metres(big_endian: bool, encoding: str, dtype: str) -> None:
     np.testing.assert_array_equal(metres, expected)
 
 
+def test_the_largest_float_is_no_distance() -> None:
+    """Simulators write it where a ray hits nothing; up to 100 km is taken as it is."""
+    stored = np.array([[np.finfo(np.float32).max, 1e30, 100_001.0, 100_000.0, 120.0]], np.float32)
+    expected = np.array([[np.nan, np.nan, np.nan, 1e5, 120.0]], np.float32)
+    np.testing.assert_array_equal(decode.depth(raw(stored, "32FC1")), expected)
+
+
 def test_what_float32_cannot_hold_is_unknown() -> None:
     assert np.isnan(decode.depth(raw(np.array([[1e300, 1e-300]]), "64FC1"))).all()
 

@@ -5,8 +5,9 @@ import pytest
 from stsem.document.accuracy import Consistency, Coverage, DistanceRow, DistanceSummary, Loss, Score
 from stsem.document.calibration import Calibration, ErrorDetection, ReliabilityBin
 from stsem.document.part import Part
-from stsem.document.schema import MapScore, TrajectoryScore
+from stsem.document.schema import MapScore
 from stsem.document.timing import Distribution, Latency, Outcomes, Throughput
+from stsem.document.trajectory import TrajectoryScore
 from stsem.metrics.catalogue import CATALOGUE, facts
 
 DOCUMENTATION = Path(__file__).parents[2] / "docs" / "metrics.md"
@@ -53,6 +54,6 @@ def test_every_number_of_the_report_is_defined(part: type[Part]) -> None:
 )
 def test_every_number_of_a_run_is_in_the_catalogue(prefix: str, part: type[Part]) -> None:
     """Whatever the schema calls a number of a run has a unit and a direction."""
-    basis = {"why", "n", "pose", "outputs", "deadline_ms"}
+    basis = {"why", "n", "pose", "outputs", "deadline_ms", "sides"}
     units = {facts(f"{prefix}.{name}").unit for name in part.model_fields if name not in basis}
     assert units <= {"fraction", "ms", "Hz", "frames", "m", "deg", "1", "points", "voxels"}

@@ -1,6 +1,6 @@
 """A log that needs no file: frames of one colour, arriving on time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -8,7 +8,6 @@ import pytest
 
 from stsem.classes import ClassSet, Labels
 from stsem.frame import Frame, Segmentation
-from stsem.geometry.homography import Homography
 from stsem.log.log import Loaded
 from stsem.log.plan import FramePlan
 from stsem.metrics.scorecard import Scorecard
@@ -18,7 +17,10 @@ from stsem.replay.realtime import Machine, RealTimeRun
 from stsem.replay.record import Record
 from stsem.replay.schedule import Slot, horizon_ns, schedule
 from stsem.sim.costs import ConstantCosts
-from stsem.stages.register import Registration
+from stsem.stages.fuse import Fuser
+from stsem.stages.keyframe import Keyframe
+from stsem.stages.propagation.method import Memoryless, Needs, Predicted
+from stsem.stages.register import Anchor, Registration
 from stsem.stages.select import EveryPolicy
 
 MS = 1_000_000
@@ -39,22 +41,25 @@ class NumberSegmenter:
         return Segmentation(np.full((4, 4), frame.index, np.uint8))
 
 
-class CopyKeyframe:
+class CopyKeyframe(Memoryless):
     """Hold, without images."""
 
-    needs_homography = False
+    needs = Needs()
 
-    def propagate(self, keyframe: object, frame: Frame, homography: Homography | None) -> Segmentation:
+    def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
         """The keyframe's labels."""
-        return keyframe.segmentation  # type: ignore[attr-defined]
+        return Predicted(source.segmentation, source.index)
+
+    def expected_coverage(self, frame: Frame, registration: Registration) -> None:
+        """Unknown."""
 
 
 class NoFeatures:
     """A register stage that finds nothing and still costs time."""
 
-    def __call__(self, frame: Frame, keyframe: object, keyframe_index: int | None) -> Registration:
+    def __call__(self, frame: Frame, anchors: Sequence[Anchor]) -> Registration:
         """Nothing found."""
-        return Registration(None, None)  # type: ignore[arg-type]
+        return Registration()
 
 
 def make_plans(count: int, *, truth: Callable[[int], bool] = lambda i: True) -> tuple[FramePlan, ...]:
@@ -84,15 +89,19 @@ class Bench:
     """Runs one mode over made-up frames and keeps everything."""
 
     def __init__(
-        self, slots: tuple[Slot, ...], *, keyframes: int | None, register: bool, queue: str, costs: dict
-    ) -> None:
+        self, slots: tuple[Slot, ...], *, keyframes: int | None, register: bool, queue: str, costs: dict,
+        in_background: bool = False, fuse: Fuser | None = None,
+    ) -> None:  # fmt: skip
         prediction = None
         if keyframes is not None:
             prediction = Prediction(EveryPolicy(keyframes), CopyKeyframe(), NoFeatures() if register else None)
         classes = ClassSet(tuple(f"frame {i}" for i in range(max(len(slots), 2))))
         self.slots, self.record = slots, Record(slots, Scorecard(classes), frozenset())
         capacity, newest_wins = parse_queue(queue)
-        machine = Machine(2, 2, ConstantCosts(costs), Mailbox(capacity, newest_wins))
+        machine = Machine(
+            2, 1 if in_background else 2, ConstantCosts(costs), Mailbox(capacity, newest_wins), fuse,
+            in_background=in_background,
+        )  # fmt: skip
         self.run = RealTimeRun(slots, AnswerRule(NumberSegmenter(), prediction), machine, self.record)
 
     def play(self, broken: frozenset[int] = frozenset()) -> "Bench":

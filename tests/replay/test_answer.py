@@ -1,6 +1,6 @@
 """The order of the stages, and the keyframes they remember, without a clock."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -16,7 +16,7 @@ from stsem.replay.offline import OfflineRun
 from stsem.replay.record import Record
 from stsem.replay.schedule import schedule
 from stsem.result import Outcome
-from stsem.stages.register import Registration
+from stsem.stages.register import Anchor, Registration
 from stsem.stages.select import EveryPolicy, PaperPolicy
 
 from .conftest import PERIOD_NS, CopyKeyframe, NumberSegmenter, loaded, make_plans, make_slots, numbered_truth
@@ -38,18 +38,20 @@ class Slide:
     def __init__(self, step: float, lost: frozenset[int] = frozenset()) -> None:
         self.step, self.lost, self.asked = step, lost, []
 
-    def __call__(self, frame: Frame, keyframe: Features | None, keyframe_index: int | None) -> Registration:
+    def __call__(self, frame: Frame, anchors: Sequence[Anchor]) -> Registration:
         features = Features(np.full((1, 2), frame.index, np.float32), np.zeros((1, 32), np.uint8), 4, 4)
-        if keyframe is None or keyframe_index is None:
+        if not anchors:
             self.asked.append((None, frame.index))
-            return Registration(features, None)
-        assert keyframe.xy[0, 0] == keyframe_index
-        self.asked.append((keyframe_index, frame.index))
-        if frame.index in self.lost:
-            return Registration(features, None)
+        return Registration(features, {anchor.index: self._between(anchor, frame.index) for anchor in anchors})
+
+    def _between(self, anchor: Anchor, index: int) -> Homography | None:
+        assert anchor.features.xy[0, 0] == anchor.index
+        self.asked.append((anchor.index, index))
+        if index in self.lost:
+            return None
         H = np.eye(3)
-        H[0, 2] = 4 * self.step * (frame.index - keyframe_index)
-        return Registration(features, Homography(H, 50, 50))
+        H[0, 2] = 4 * self.step * (index - anchor.index)
+        return Homography(H, 50, 50)
 
 
 def offline(count: int, rule: AnswerRule, broken: frozenset[int] = frozenset()) -> Record:

@@ -14,8 +14,10 @@ from stsem.frame import Frame, Segmentation
 from stsem.geometry.features import Features
 from stsem.replay import calibrate
 from stsem.replay.calibrate import Subject, measure
-from stsem.stages.propagate import Hold
+from stsem.stages.propagation.hold import Hold
+from stsem.stages.propagation.method import Predicted
 from stsem.stages.register import Registration
+from stsem.stages.select import PaperPolicy
 
 MS = 1_000_000
 COSTS_MS = {"segment": 100, "register": 5, "propagate": 2, "fuse": 7, "decode": 3}
@@ -47,9 +49,9 @@ class Host:
         return None if self.others is None else self.own_ns + self.others_ns + round(self.others * self.now_ns)
 
 
-def no_features(register: object, frame: Frame, keyframe: object, keyframe_index: object) -> Registration:
+def no_features(register: object, frame: Frame, anchors: object) -> Registration:
     """A register stage that finds nothing, at no expense."""
-    return Registration(Features(np.empty((0, 2), np.float32), np.empty((0, 32), np.uint8), *frame.size), None)
+    return Registration(Features(np.empty((0, 2), np.float32), np.empty((0, 32), np.uint8), *frame.size))
 
 
 class FakeNetwork:
@@ -93,9 +95,9 @@ class SlowHold(Hold):
     def __init__(self, machine: Host) -> None:
         self.machine = machine
 
-    def propagate(self, *args: Any) -> Segmentation:
+    def predict(self, *args: Any) -> Predicted:
         self.machine.work(COSTS_MS["propagate"] * MS)
-        return super().propagate(*args)
+        return super().predict(*args)
 
 
 def frames(count: int = 3) -> list[Frame]:
@@ -110,12 +112,15 @@ def frames(count: int = 3) -> list[Frame]:
     ]  # fmt: skip
 
 
+PAPER = PaperPolicy(1.0, 1.0, 1)
+
+
 def subject(machine: Host, *, cores: tuple[int, ...] = (1, 2), decode: bool = False) -> Subject:
     def decoded() -> None:
         machine.work(COSTS_MS["decode"] * MS)
 
     return Subject(
-        FakeNetwork(), "onnxruntime", "f32", cores, SlowHold(machine), 0, decoded if decode else None  # type: ignore[arg-type]
+        FakeNetwork(), "onnxruntime", "f32", cores, "hold", SlowHold(machine), PAPER, 0, decoded if decode else None  # type: ignore[arg-type]
     )  # fmt: skip
 
 
@@ -130,6 +135,7 @@ def test_every_stage_is_measured(host: Host) -> None:
     assert not profile.disturbed
     assert profile.made_for["network"] == "fake"
     assert profile.made_for["image"] == "32x24"
+    assert (profile.made_for["propagation"], profile.made_for["register"]) == ("hold", "points")
 
 
 def test_quick_stages_are_thinned_fairly() -> None:

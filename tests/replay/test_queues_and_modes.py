@@ -62,11 +62,12 @@ def test_no_such_queue(text: str) -> None:
 def test_modes() -> None:
     """In the table's order, each once; `both` is the default pair."""
     assert [m.name for m in parse_modes("keyframe,per-frame,keyframe")] == ["per-frame", "keyframe"]
-    assert parse_modes("both") == parse_modes(" per-frame , keyframe ") == tuple(MODES.values())
+    assert parse_modes("both") == parse_modes(" per-frame , keyframe ") == (MODES["per-frame"], MODES["keyframe"])
+    assert parse_modes("keyframe-async,both") == tuple(MODES.values())
     assert [m.name for m in parse_modes("keyframe")] == ["keyframe"]
-    assert [m.network_cores for m in MODES.values()] == [2, 2]
+    assert [m.network_cores for m in MODES.values()] == [2, 2, 1]
     for text in ("", " , ", "perframe", "both,async"):
-        with pytest.raises(UsageError, match="per-frame, keyframe and both"):
+        with pytest.raises(UsageError, match="per-frame, keyframe, keyframe-async and both"):
             parse_modes(text)
 
 

@@ -41,7 +41,8 @@ def test_channels_times_and_colours(tmp_path: Path) -> None:
     shown = np.frombuffer(decoded["/stsem/keyframe/labels"].data, np.uint8).reshape(2, 2, 3)
     np.testing.assert_array_equal(shown, [[[10, 20, 30], [200, 100, 50]], [[200, 100, 50], [0, 0, 0]]])
     assert json.loads(raw["/stsem/keyframe/answer"][1].data) == {
-        "frame": 7, "outcome": "segmented", "keyframe": 7, "reason": "first", "latency_ms": 42.5, "coverage": 0.75,
+        "frame": 7, "outcome": "segmented", "keyframe": 7, "reason": "first", "remark": "", "latency_ms": 42.5,
+        "coverage": 0.75,
     }  # fmt: skip
     assert (legend.name, legend.metadata) == ("stsem.classes", {"wall": "#0a141e 0", "door": "#c86432 1"})
     assert decoded["/stsem/pose"].translation.z == 3

@@ -7,11 +7,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from made_up_comparison import with_third_mode
 from made_up_run import example
 
 from stsem.document.accuracy import Score
-from stsem.document.schema import MapScore, Run, TrajectoryScore
+from stsem.document.schema import MapScore, Run
 from stsem.document.timing import Latency, Outcomes, Throughput
+from stsem.document.trajectory import TrajectoryScore
 from stsem.report.contents import outline
 from stsem.report.frames_csv import frames_csv
 from stsem.report.html import html
@@ -131,6 +133,17 @@ def test_reading_order_and_basis() -> None:
     assert any("Mean of the IoU over the classes that have truth pixels" in note for note in table.notes)
     assert [tile.value for tile in report.tiles] == ["70.4 %", "77.4 %", "16.1 ms", "9.92 Hz"]
     assert [tile.good for tile in report.tiles] == [True, False, True, True]
+
+
+def test_the_headline_compares_the_mode_that_it_names() -> None:
+    """Of three modes, the tiles show the last against the first, and each pair has its sentence."""
+    document = with_third_mode(example(pictures=False).document)
+    report = outline(document, frozenset())
+    rate = report.tiles[-1]
+    base, other = (run.throughput.output_hz or 0 for run in (document.runs[0], document.runs[2]) if run.throughput)
+    assert (rate.mode, rate.value, rate.delta) == ("keyframe-async", f"{other:.2f} Hz", f"{other - base:+.2f} Hz")
+    said = [text for text in report.lead if " against `per-frame`" in text]
+    assert [text.split("`")[1] for text in said] == ["keyframe", "keyframe-async"]
 
 
 def test_poses_and_map_in_units_of_readers() -> None:

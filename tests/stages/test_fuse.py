@@ -8,8 +8,10 @@ import pytest
 from stsem.camera import Camera
 from stsem.classes import NO_LABEL
 from stsem.frame import Frame, Segmentation
+from stsem.mapping.anchored import AnchoredCloud
 from stsem.mapping.cloud import LabelledCloud
-from stsem.stages.fuse import Fuse
+from stsem.pose import Pose
+from stsem.stages.fuse import AnchoredFuse, Fuse
 
 CAMERA = Camera(4, 3, 2.0, 2.0, 1.5, 1.0)
 
@@ -54,3 +56,19 @@ def test_without_a_pose_nothing_is_added() -> None:
     fuse = Fuse(LabelledCloud())
     fuse(replace(whole(), T_WC=None), Segmentation(np.zeros((3, 4), np.uint8)))
     assert len(fuse.cloud) == 0
+
+
+def test_an_anchored_keyframe_goes_where_its_anchor_is_in_the_end() -> None:
+    """Fused 1 m ahead of SLAM's keyframe 1, which a loop moves 5 m along x afterwards."""
+    ahead, moved = np.eye(4), np.eye(4)
+    ahead[2, 3], moved[0, 3] = 1.0, 5.0
+    anchors: dict[int, tuple[int, Pose]] = {0: (1, ahead)}
+    fuse = AnchoredFuse(AnchoredCloud(cell_m=0.01), anchors.get)
+    assert fuse.can_fuse(whole())
+    assert not fuse.can_fuse(replace(whole(), T_WC=None))
+    fuse(whole(), Segmentation(np.zeros((3, 4), np.uint8)))
+    fuse(replace(whole(), index=7), Segmentation(np.zeros((3, 4), np.uint8)))  # lost: it hangs on nothing
+    points = fuse.cloud.cloud([np.eye(4), moved]).points
+    assert len(points) == 12
+    assert points.xyz[:, 2] == pytest.approx(3.0)
+    assert points.xyz[:, 0].mean() == pytest.approx(5.0)

@@ -1,15 +1,20 @@
 """Labels from a keyframe: held, or moved by a homography."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stsem.classes import NO_LABEL, Labels
+from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.frame import Frame, Segmentation
 from stsem.geometry.homography import Homography
 from stsem.stages.keyframe import Keyframe
-from stsem.stages.propagate import PROPAGATIONS, Hold, HomographyWarp
+from stsem.stages.propagate import PROPAGATIONS
+from stsem.stages.propagation.hold import Hold
+from stsem.stages.propagation.homography import LOST, HomographyWarp
+from stsem.stages.register import Registration
 from stsem.uncertainty import Uncertainty
 
 WIDTH, HEIGHT = 20, 14
@@ -34,19 +39,31 @@ def shift(dx: float, dy: float) -> Homography:
     return Homography(np.array([[1, 0, dx], [0, 1, dy], [0, 0, 1]], np.float64), 100, 100)
 
 
+def registered(homography: Homography | None) -> Registration:
+    return Registration(None, {0: homography})
+
+
+def held(source: Keyframe, shot: Frame, homography: Homography | None = None) -> Segmentation:
+    return Hold().predict(source, shot, registered(homography)).answer
+
+
+def warped_by(homography: Homography | None, source: Keyframe, shot: Frame) -> Segmentation:
+    return HomographyWarp(0).predict(source, shot, registered(homography)).answer
+
+
 def test_hold_copies() -> None:
     """Every pixel, those without a label too; a homography changes nothing."""
     labels = picture()
     for homography in (None, shift(3, 0)):
-        assert (Hold().propagate(keyframe(labels), frame(), homography).labels == labels).all()
+        assert (held(keyframe(labels), frame(), homography).labels == labels).all()
 
 
 def test_hold_resizes_by_nearest_neighbour() -> None:
     """Twice the size: each pixel four times, nothing in between."""
     labels = picture()
-    held = Hold().propagate(keyframe(labels), frame(2 * WIDTH, 2 * HEIGHT), None).labels
-    assert (held == labels.repeat(2, axis=0).repeat(2, axis=1)).all()
-    small = Hold().propagate(keyframe(labels), frame(WIDTH // 2, HEIGHT // 2), None).labels
+    big = held(keyframe(labels), frame(2 * WIDTH, 2 * HEIGHT)).labels
+    assert (big == labels.repeat(2, axis=0).repeat(2, axis=1)).all()
+    small = held(keyframe(labels), frame(WIDTH // 2, HEIGHT // 2)).labels
     assert small.shape == (HEIGHT // 2, WIDTH // 2)
     assert set(np.unique(small)) <= set(np.unique(labels))
 
@@ -54,29 +71,39 @@ def test_hold_resizes_by_nearest_neighbour() -> None:
 @settings(max_examples=60, deadline=None)
 @given(dx=st.integers(-25, 25), dy=st.integers(-18, 18), seed=st.integers(0, 5))
 def test_translations_are_exact(dx: int, dy: int, seed: int) -> None:
-    """Whole pixels move to the pixel; what the keyframe does not reach is copied in place; 255 stays 255."""
+    """Whole pixels move to the pixel; what the keyframe does not reach gets its border; 255 stays 255."""
     labels = picture(seed)
-    warped = HomographyWarp().propagate(keyframe(labels), frame(), shift(dx, dy)).labels
-    expected = labels.copy()
+    answer = warped_by(shift(dx, dy), keyframe(labels), frame())
+    expected, reached = labels.copy(), np.zeros(labels.shape, np.bool_)
     for y in range(HEIGHT):
         for x in range(WIDTH):
-            if 0 <= y - dy < HEIGHT and 0 <= x - dx < WIDTH:
-                expected[y, x] = labels[y - dy, x - dx]
-    assert (warped == expected).all()
+            expected[y, x] = labels[min(max(y - dy, 0), HEIGHT - 1), min(max(x - dx, 0), WIDTH - 1)]
+            reached[y, x] = 0 <= y - dy < HEIGHT and 0 <= x - dx < WIDTH
+    assert (answer.labels == expected).all()
+    assert answer.covered is not None
+    assert (answer.covered == reached).all()
+    method = HomographyWarp(0)
+    method.selected(replace(frame(), index=0), None)
+    foretold = method.expected_coverage(frame(), registered(shift(dx, dy)))
+    assert foretold == pytest.approx(reached.mean(), abs=1e-3)
 
 
 def test_no_homography_holds() -> None:
     """Without one that can be trusted the whole keyframe is copied."""
     labels = picture()
-    assert (HomographyWarp().propagate(keyframe(labels), frame(), None).labels == labels).all()
+    found = HomographyWarp(0).predict(keyframe(labels), frame(), registered(None))
+    assert (found.answer.labels == labels).all()
+    assert found.answer.covered is not None
+    assert not found.answer.covered.any()
+    assert found.remark == LOST
 
 
 def test_the_keyframe_is_left_alone() -> None:
     """Its labels serve the next frame, too; and a caller that writes into an answer must not reach them by accident."""
     labels = picture()
     before = labels.copy()
-    HomographyWarp().propagate(keyframe(labels), frame(), shift(2, 1))
-    Hold().propagate(keyframe(labels), frame(), None)
+    warped_by(shift(2, 1), keyframe(labels), frame())
+    held(keyframe(labels), frame())
     assert (labels == before).all()
 
 
@@ -84,18 +111,11 @@ def test_the_keyframe_of_another_size() -> None:
     """H maps keyframe pixels to frame pixels: a zoom of 2 from an image of half the size."""
     labels = picture()
     zoom = Homography(np.array([[2, 0, 0.5], [0, 2, 0.5], [0, 0, 1]], np.float64), 100, 100)
-    warped = HomographyWarp().propagate(keyframe(labels), frame(2 * WIDTH, 2 * HEIGHT), zoom).labels
+    warped = warped_by(zoom, keyframe(labels), frame(2 * WIDTH, 2 * HEIGHT)).labels
     assert (warped == labels.repeat(2, axis=0).repeat(2, axis=1)).all()
 
 
-@pytest.mark.parametrize(("name", "needs"), [("hold", False), ("homography", True)])
-def test_table(name: str, needs: bool) -> None:
-    """What the command line offers, and what each asks of the register stage."""
-    assert PROPAGATIONS[name]().needs_homography is needs
-    assert set(PROPAGATIONS) == {"hold", "homography"}
-
-
-@pytest.mark.parametrize("method", PROPAGATIONS)
+@pytest.mark.parametrize("method", ["hold", "homography"])
 @pytest.mark.parametrize("homography", [None, shift(3, -2)])
 @pytest.mark.parametrize("grown", [1, 2])
 def test_confidence_stays_with_its_label(method: str, homography: Homography | None, grown: int) -> None:
@@ -103,11 +123,12 @@ def test_confidence_stays_with_its_label(method: str, homography: Homography | N
     labels = picture()
     said = Uncertainty(("entropy",), np.zeros((1, HEIGHT, WIDTH), np.uint8), 5)
     source = Keyframe(0, 0, Segmentation(labels, labels / np.float32(256), said))
-    answer = PROPAGATIONS[method]().propagate(source, frame(grown * WIDTH, grown * HEIGHT), homography)
+    made, shot = PROPAGATIONS[method].make(ClassSet(("a", "b")), 0), frame(grown * WIDTH, grown * HEIGHT)
+    answer = made.predict(source, shot, registered(homography)).answer
     assert answer.confidence is not None
     assert answer.confidence.dtype == np.float32
     np.testing.assert_array_equal(answer.confidence * 256, answer.labels)
     assert answer.uncertainty is None
-    plain = PROPAGATIONS[method]().propagate(keyframe(labels), frame(grown * WIDTH, grown * HEIGHT), homography)
+    plain = made.predict(keyframe(labels), shot, registered(homography)).answer
     assert plain.confidence is None
     np.testing.assert_array_equal(plain.labels, answer.labels)

@@ -108,7 +108,7 @@ def test_the_log_has_what_was_rendered(rendered: Any) -> None:
         ({"length_s": 0}, "A length of 0 s"),
         ({"length_s": float("inf")}, "at most a day"),
         ({"noise": "salt"}, "'salt'; give kinect or none"),
-        ({"speed": "fast"}, "'fast'; give steady or varying"),
+        ({"speed": "fast"}, "'fast'; give steady, searching, varying"),
         ({"label_every": 0}, "every 0 frames"),
     ],
 )

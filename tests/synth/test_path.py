@@ -61,10 +61,10 @@ def in_a_doorway(plan: FloorPlan, x: float, y: float) -> bool:
 
 @pytest.mark.parametrize("layout", [12, 7003])
 def test_the_walk_keeps_clear_of_furniture(layout: int) -> None:
-    """Tours of every room in both manners of walking."""
+    """Tours of every room in every manner of walking."""
     office = furnished(layout)
     boxes = np.array(office.furnishing.obstacles)
-    for seed, speed in enumerate(("steady", "varying")):
+    for seed, speed in enumerate(("steady", "searching", "varying")):
         places = states_of(office, layout, seed, 120, speed)[:, None, :2]
         beyond = np.maximum(np.maximum(boxes[:, :2] - places, places - boxes[:, 2:]), 0)
         assert np.linalg.norm(beyond, axis=2).min() > ELBOW_M
@@ -120,7 +120,7 @@ def test_a_varying_walk_pauses_and_hurries() -> None:
     assert np.quantile(pace, 0.95) > 0.7
 
 
-@pytest.mark.parametrize(("speed", "limit"), [("steady", 45.0), ("varying", 90.0)])
+@pytest.mark.parametrize(("speed", "limit"), [("steady", 45.0), ("searching", 45.0), ("varying", 90.0)])
 def test_it_turns_no_faster_than_asked(speed: str, limit: float) -> None:
     """Yaw up to the limit (and it gets there), pitch up to half of it, looking neither at its feet nor at the sky."""
     office = furnished(12)
@@ -130,6 +130,15 @@ def test_it_turns_no_faster_than_asked(speed: str, limit: float) -> None:
     assert pitch <= limit / 2 + 1e-6
     assert np.degrees(states[:, 4]).min() > -25
     assert np.degrees(states[:, 4]).max() < 11
+
+
+def test_a_steady_walk_mostly_looks_along_the_way_and_a_search_mostly_elsewhere() -> None:
+    """Degrees per second, the middle one of three minutes in each of two offices."""
+    middle = {}
+    for speed in ("steady", "searching"):
+        yaw = [states_of(furnished(layout), layout, 5, 180, speed)[:, 3] for layout in (12, 7003)]
+        middle[speed] = np.degrees(np.median(np.abs(np.concatenate([np.diff(one) for one in yaw])))) / STEP_S
+    assert middle["steady"] < 20 < 25 < middle["searching"]
 
 
 def test_poses_are_optical_and_in_between_states() -> None:
@@ -150,5 +159,5 @@ def test_poses_are_optical_and_in_between_states() -> None:
 
 def test_unknown_speed_is_named() -> None:
     """The sentence lists what there is."""
-    with pytest.raises(UsageError, match="'fast'; give steady or varying"):
+    with pytest.raises(UsageError, match="'fast'; give steady, searching, varying"):
         profile("fast")

@@ -6,7 +6,18 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from stsem.report.inputs import ReportInputs
-from stsem.report.plots import calibration, classes, distance, latency, loss, overview, strip, timeline, uncertainty
+from stsem.report.plots import (
+    calibration,
+    classes,
+    distance,
+    latency,
+    loss,
+    overview,
+    strip,
+    timeline,
+    trajectory,
+    uncertainty,
+)
 from stsem.report.plots.style import look, png, svg
 
 
@@ -33,6 +44,7 @@ DRAWERS: dict[str, Callable[[ReportInputs], Figure | None]] = {
     "latency": latency.draw,
     "timeline": timeline.draw,
     "calibration": calibration.draw,
+    "trajectory": trajectory.draw,
     "uncertainty": uncertainty.draw,
     "strip": strip.draw,
 }

@@ -60,6 +60,7 @@ def draw(inputs: ReportInputs) -> Figure | None:
         _line(axes, groups, begin, mode_colour(run.mode, i), run.mode)
         _ticks(axes, groups, begin, floor - step * (i + 0.9), mode_colour(run.mode, i), 0.8 * step)
     axes.set_ylim(floor - step * (len(runs) + 0.4), 101)
+    axes.set_yticks([tick for tick in axes.get_yticks() if 0 <= tick <= 100])  # below 0 there are ticks of frames only
     axes.set_xlabel("Log time, s")
     axes.set_ylabel("Pixel accuracy, %")
     title(axes, f"Pixel accuracy over the log ({chosen})", _below(size))

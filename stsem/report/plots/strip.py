@@ -41,7 +41,9 @@ def draw(inputs: ReportInputs) -> Figure | None:
     columns = len(titles) if with_truth else len(titles) + 2
     figure.legend(handles=handles, loc="outside lower left", ncols=columns, title="Classes", alignment="left")
     if with_truth:
-        figure.legend(handles=_error_legend(modes), loc="lower right", ncols=2, title="Errors", alignment="left")
+        wrong = _error_legend(modes)
+        beside = max(2, -(-len(wrong) // 2))  # two rows, as the classes have or more
+        figure.legend(handles=wrong, loc="lower right", ncols=beside, title="Errors", alignment="left")
     legend_in = 0.36 + 0.165 * max(2, -(-len(handles) // columns))
     figure.set_size_inches(_COLUMN_IN * len(titles), len(inputs.strip) * (_COLUMN_IN * aspect + 0.2) + 0.25 + legend_in)
     return figure

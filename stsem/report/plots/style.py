@@ -22,7 +22,8 @@ MODE_COLOURS = {"per-frame": "#0072b2", "keyframe": "#d55e00", "keyframe-async":
 _FURTHER = ("#b5488b", "#7a6a00", "#3d5a80")
 
 STAGE_COLOURS = {
-    "decode": "#3b8f86", "register": "#56b4e9", "segment": "#6f4ea0", "propagate": "#e6a817", "fuse": "#a5744f",
+    "decode": "#3b8f86", "register": "#56b4e9", "segment": "#6f4ea0", "propagate": "#e6a817",
+    "track": "#c2548c", "fuse": "#a5744f",
 }  # fmt: skip
 """One per stage of `stsem.result.STAGES`."""
 UNKNOWN_STAGE = "#9aa4ad"

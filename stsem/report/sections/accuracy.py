@@ -1,6 +1,6 @@
 """Sections about how right the answers are."""
 
-from stsem.document.accuracy import Consistency, DistanceSummary, Loss, Score
+from stsem.document.accuracy import Consistency, DistanceRow, DistanceSummary, Loss, Score
 from stsem.document.schema import Comparison, Document, Run
 from stsem.report.metrics import METRICS, no_intervals, row_delta, row_name, row_reading, row_value, shown
 from stsem.report.outline import Block, Column, Figure, Folded, Row, Section, Table, Text
@@ -84,32 +84,70 @@ def _part(run: Run, name: str) -> tuple[str, str]:
 def distance_section(document: Document) -> Section | None:
     """Accuracy by distance to the keyframe."""
     runs = [run for run in document.runs if len(run.by_distance) > 1]
-    if not runs:
+    rests = [Text(said) for run in document.runs if (said := _evidence(run))]
+    ages = _ages(document)
+    if not (runs or rests or ages):
         return None
-    blocks: list[Block] = [Figure("distance", "mIoU over the distance to the keyframe")]
+    blocks: list[Block] = [Figure("distance", "mIoU over the distance to the keyframe")] if runs else []
     for run in runs:
         if run.by_distance_summary:
-            blocks.append(Text(_summary(run, run.by_distance_summary)))
-        blocks.append(Folded(f"By distance, {run.mode}", (_distances(run),)))
-    return Section("By distance to the keyframe", tuple(blocks))
+            blocks.append(Text(_summary(run, "distances", run.by_distance_summary)))
+        note = "Offline pass. Distance 0 is the keyframe itself; ms: mean of capture time."
+        blocks.append(Folded(f"By distance, {run.mode}", (_distances(run.by_distance, note),)))
+    return Section("By distance to the keyframe", (*blocks, *rests, *ages))
 
 
-def _summary(run: Run, summary: DistanceSummary) -> str:
+def _ages(document: Document) -> list[Block]:
+    """Accuracy by the age of the answer, of modes whose answers do not wait for the network."""
+    blocks: list[Block] = []
+    for run in document.runs:
+        beside = run.background
+        if beside is None or not beside.age_ms.n:
+            continue
+        oldest, mean = number(beside.age_ms.max, 0), number(beside.age_ms.mean, 0)
+        said = f"`{run.mode}`: answers rest on keyframes {mean} ms old on average, at most {oldest} ms."
+        if beside.by_age_summary:
+            said += " " + _summary(run, "ages", beside.by_age_summary)
+        blocks.append(Text(said))
+        if beside.by_age:
+            note = "Delivered. Age: from the keyframe that the labels come from to the frame; ms: mean of capture time."
+            blocks.append(Folded(f"By age, {run.mode}", (_distances(beside.by_age, note),)))
+    return blocks
+
+
+def _summary(run: Run, what: str, summary: DistanceSummary) -> str:
     return (
-        f"`{run.mode}`, over the {summary.distances} distances with at least {summary.min_frames} frames: mIoU mean "
+        f"`{run.mode}`, over the {summary.distances} {what} with at least {summary.min_frames} frames: mIoU mean "
         f"{percent(summary.miou_mean)} %, minimum {percent(summary.miou_min)} %; pixel accuracy mean "
         f"{percent(summary.pixel_accuracy_mean)} %, minimum {percent(summary.pixel_accuracy_min)} %."
     )
 
 
-def _distances(run: Run) -> Table:
-    columns = (Column("frames"), Column("ms"), Column("mIoU, %"), Column("pixel accuracy, %"), Column("n"))
-    rows = tuple(
-        Row((str(row.frames), number(row.ms, 0), percent(row.miou), percent(row.pixel_accuracy),
-             count(row.n) + ("" if row.n >= ENOUGH else " (few)")))
-        for row in run.by_distance
+def _evidence(run: Run) -> str:
+    """What predicted answers rest on, and what they had to do without; "" where nobody says."""
+    said = [] if run.covered is None else [f"{percent(run.covered)} % of the pixels of predicted answers are covered"]
+    said += [f"{plural(frames, 'frame')} predicted with {what}" for what, frames in run.remarks.items()]
+    answers = "offline" if run.clock == "offline" else "as delivered"
+    return f"`{run.mode}`, {answers}: {'; '.join(said)}." if said else ""
+
+
+def _distances(found: tuple[DistanceRow, ...], note: str) -> Table:
+    told = any(row.covered is not None for row in found)
+    columns = (
+        Column("frames"), Column("ms"), Column("mIoU, %"), Column("pixel accuracy, %"),
+        *((Column("covered, %"), Column("there: mIoU, %"), Column("there: pixel accuracy, %")) if told else ()),
+        Column("n"),
     )  # fmt: skip
-    return Table(columns, rows, ("Offline pass. Distance 0 is the keyframe itself; ms: median of capture time.",))
+    rows = tuple(Row(_distance_cells(row, told)) for row in found)
+    return Table(columns, rows, (note, f"Covered: {meaning(DistanceRow, 'covered')}") if told else (note,))
+
+
+def _distance_cells(row: DistanceRow, told: bool) -> tuple[str, ...]:
+    covered = (percent(row.covered), percent(row.covered_miou), percent(row.covered_pixel_accuracy))
+    return (
+        str(row.frames), number(row.ms, 0), percent(row.miou), percent(row.pixel_accuracy),
+        *(covered if told else ()), count(row.n) + ("" if row.n >= ENOUGH else " (few)"),
+    )  # fmt: skip
 
 
 def classes_section(document: Document) -> Section | None:

@@ -1,8 +1,8 @@
 """The top of the report: what a hurried reader must know."""
 
 from stsem.document.accuracy import Score
-from stsem.document.schema import ComparisonRow, Document, Run
-from stsem.report.metrics import METRICS, row_delta, row_reading, shown
+from stsem.document.schema import Comparison, ComparisonRow, Document, Run
+from stsem.report.metrics import METRICS, comparisons, row_delta, row_reading, shown
 from stsem.report.outline import Tile
 from stsem.report.wording import NONE, NOT_MEASURED, TOO_FEW, meaning, number, percent, plural
 
@@ -23,12 +23,10 @@ def report_title(document: Document) -> str:
 
 
 def lead(document: Document) -> tuple[str, ...]:
-    """Verdict, the comparison in one sentence, and what the numbers rest on."""
+    """Verdict, each comparison in one sentence, and what the numbers rest on."""
     sentences = [document.verdict.text, *document.state_reasons]
-    if document.comparison and (said := _compared(document)):
-        sentences.append(said)
-    else:
-        sentences += [_alone(run) for run in document.runs]
+    compared = [said for comparison in comparisons(document) if (said := _compared(document, comparison))]
+    sentences += compared or [_alone(run) for run in document.runs]
     return (*sentences, basis(document))
 
 
@@ -63,7 +61,8 @@ def tiles(document: Document) -> tuple[Tile, ...]:
     if not document.runs:
         return ()
     base, other = document.runs[0], document.runs[-1]
-    rows = {row.metric: row for row in document.comparison.rows} if document.comparison else {}
+    pairs = (c.rows for c in comparisons(document) if (c.base, c.other) == (base.mode, other.mode))
+    rows = {row.metric: row for row in next(pairs, ())}
     return tuple(
         _tile(path, base, other, rows.get(path))
         for path in _TILES
@@ -91,11 +90,9 @@ def _good(row: ComparisonRow) -> bool | None:
     return (row.delta > 0) == row.higher_is_better
 
 
-def _compared(document: Document) -> str:
-    comparison = document.comparison
-    base = document.run(comparison.base) if comparison else None
-    other = document.run(comparison.other) if comparison else None
-    if comparison is None or base is None or other is None:
+def _compared(document: Document, comparison: Comparison) -> str:
+    base, other = document.run(comparison.base), document.run(comparison.other)
+    if base is None or other is None:
         return ""
     parts = []
     rows = {row.metric: row for row in comparison.rows}

@@ -2,10 +2,9 @@
 
 import json
 
-from stsem.document.part import Part
-from stsem.document.schema import Document, MapScore, TrajectoryScore
+from stsem.document.schema import Document
 from stsem.report.outline import Block, Code, Column, Folded, Items, Row, Section, Table, Text
-from stsem.report.wording import NONE, NOT_MEASURED, count, meaning, number, percent
+from stsem.report.wording import NONE, count, number
 
 
 def input_section(document: Document) -> Section:
@@ -42,49 +41,6 @@ def _channels(document: Document) -> Table:
 
 def _size(size: tuple[int, int] | None) -> str:
     return NONE if size is None else f"{size[0]}×{size[1]}"
-
-
-def space_section(document: Document) -> Section | None:
-    """Poses and map, where they were measured."""
-    blocks = [
-        block
-        for name, part in (("trajectory", TrajectoryScore), ("map", MapScore))
-        if (block := _scores(document, name, part)) is not None
-    ]
-    return Section("Poses and map", tuple(blocks)) if blocks else None
-
-
-def _scores(document: Document, name: str, part: type[Part]) -> Table | None:
-    runs = [run for run in document.runs if getattr(run, name) is not None]
-    if not runs:
-        return None
-    columns = (Column(name, number=False), *(Column(run.mode) for run in runs))
-    parts = [getattr(run, name) for run in runs]
-    fields = [field for field in part.model_fields if any(getattr(run_part, field) for run_part in parts)]
-    rows = tuple(
-        Row(
-            (_titled(field), *(_plain(field, getattr(getattr(run, name), field)) for run in runs)), meaning(part, field)
-        )
-        for field in fields
-    )
-    return Table(columns, rows)
-
-
-_IN_PER_CENT = ("share", "miou_3d", "observed", "accuracy_3d", "f_score")
-_UNITS = {"_m": ", m", "_deg": ", deg"}
-
-
-def _titled(field: str) -> str:
-    if field.endswith(_IN_PER_CENT):
-        return f"{field.replace('_', ' ')}, %"
-    ending = next((ending for ending in _UNITS if field.endswith(ending)), "")
-    return field.removesuffix(ending).replace("_", " ") + _UNITS.get(ending, "")
-
-
-def _plain(field: str, value: object) -> str:
-    if isinstance(value, float):
-        return percent(value) if field.endswith(_IN_PER_CENT) else f"{value:.3f}"
-    return count(value) if isinstance(value, int) else NOT_MEASURED if value is None else str(value)
 
 
 def unmeasured_section(document: Document) -> Section | None:

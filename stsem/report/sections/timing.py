@@ -68,11 +68,18 @@ def _stages(runs: list[Run]) -> Table:
         for run in runs:
             part = run.latency_ms.stages.get(stage) if run.latency_ms else None
             if part and part.service.n:
-                beside = "" if stage in ANSWER_STAGES else " (beside the path)"
-                rows.append(Row((stage + beside, run.mode, percentile(part.service, "p50"), number(part.service.max),
-                                 number(part.service.mean), number(part.waiting.mean), number(part.waiting.max),
-                                 count(part.service.n))))  # fmt: skip
+                rows.append(Row((
+                    stage + _beside(run, stage), run.mode, percentile(part.service, "p50"), number(part.service.max),
+                    number(part.service.mean), number(part.waiting.mean), number(part.waiting.max),
+                    count(part.service.n),
+                )))  # fmt: skip
     return Table(columns, tuple(rows), ("Waiting: from ready to start, for cores. Service: time on the cores.",))
+
+
+def _beside(run: Run, stage: str) -> str:
+    """Said of a stage that no answer waits for."""
+    waited_for = ANSWER_STAGES if run.background is None else [s for s in ANSWER_STAGES if s != "segment"]
+    return "" if stage in waited_for or stage in run.stages_inside else " (beside the path)"
 
 
 _RATES: dict[str, str] = {
@@ -130,8 +137,8 @@ def outcomes_section(document: Document) -> Section | None:
         Figure("overview", "pixel accuracy of each frame over the log"),
         Table(columns, tuple(rows), notes),
     ]
-    blocks += [Text(_keyframes(run)) for run in runs if run.keyframes]
-    disabled = tuple(f"`{run.mode}`: {stage} was off for {count(n)} frames, an optional channel was missing."
+    blocks += [Text(_keyframes(run)) for run in runs if run.keyframes or run.background]
+    disabled = tuple(f"`{run.mode}`: {stage} was off for {count(n)} frames, an optional channel or a pose was missing."
                      for run in runs for stage, n in run.stages_disabled.items())  # fmt: skip
     return Section("What became of the frames", (*blocks, Items(disabled)) if disabled else tuple(blocks))
 
@@ -141,4 +148,16 @@ def _keyframes(run: Run) -> str:
     share = percent(len(run.keyframes) / run.frames) if run.frames else NONE
     moved = f"; {count(run.keyframes_moved)} moved to the next frame with truth" if run.keyframes_moved else ""
     keyframes = f"{plural(len(run.keyframes), 'keyframe')} ({share} % of the frames)"
-    return f"`{run.mode}`: {keyframes}; why: {reasons or 'not stated'}{moved}."
+    return f"`{run.mode}`: {keyframes}; why: {reasons or 'not stated'}{moved}.{_choices(run)}"
+
+
+def _choices(run: Run) -> str:
+    """What became of the frames chosen, where answers do not wait for the network; "" elsewhere."""
+    beside = run.background
+    if beside is None:
+        return ""
+    return (
+        f" Of {plural(beside.chosen, 'frame')} chosen, {count(beside.finished)} became keyframes beside the answers, "
+        f"{count(beside.replaced)} lost their place before the network to a newer choice, {count(beside.unfinished)} "
+        "were unfinished at the end."
+    )

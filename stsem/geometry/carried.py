@@ -1,0 +1,31 @@
+"""Labels brought from keyframes to the current frame, with what is known of them: the result of a warp."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from stsem.classes import Labels
+from stsem.uncertainty import Confidence
+
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Labels for every pixel of a frame, and where they rest on evidence.
+
+    Args:
+        labels: (H, W) uint8; where nothing covers a pixel, by the rule of the method.
+        confidence: (H, W) float32 that moved with the labels; None where the keyframes have none.
+        covered: (H, W) bool: the keyframe saw this point, so far as the method can tell.
+    """
+
+    labels: Labels
+    confidence: Confidence | None
+    covered: Bools
+
+    @property
+    def coverage(self) -> float:
+        """Share of the pixels that are covered, 0..1."""
+        return float(np.count_nonzero(self.covered)) / max(1, self.covered.size)

@@ -1,0 +1,163 @@
+"""Dense optical flow from each frame to the one before it, and chains of flows back to a keyframe.
+
+Flow over the large distance to a keyframe collapses; between neighbouring frames it holds, so flows are chained:
+M_t(x) = M_{t-1}(x + f_t(x)), where f_t points from frame t to frame t - 1 and M_0 is the identity at the keyframe.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TypeVar
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from stsem.classes import Labels
+from stsem.frame import Depth, Image
+from stsem.geometry.carried import Bools, Carried
+from stsem.uncertainty import Confidence
+
+Value = TypeVar("Value", np.uint8, np.float32)
+Grey = npt.NDArray[np.uint8]
+Field = npt.NDArray[np.float32]
+"""(h, w, 2) float32: x and y at each pixel of the working image."""
+
+WORKING_SIDE = 480
+"""Longer side, in pixels, of the images between which flow is sought (docs/propagation.md has what others cost)."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """Settings of OpenCV's dense inverse search.
+
+    Args:
+        preset: one of cv2.DISOPTICAL_FLOW_PRESET_*.
+        finest: the level of the pyramid that it ends at, 0 being the image itself; None as the preset has it. It
+            decides more than the preset does (docs/propagation.md).
+    """
+
+    preset: int = cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST
+    finest: int | None = 1
+
+
+SEARCH = Search()
+MIN_SIDE = 16
+"""A smaller image has no room for a pyramid of patches; nothing is said to move there."""
+
+
+def working_grey(image: Image, *, side: int = WORKING_SIDE) -> Grey:
+    """(h, w) uint8: `image` (H, W, 3) in grey, its longer side at most `side` pixels."""
+    height, width = image.shape[:2]
+    scale = side / max(width, height)
+    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+    if scale < 1:
+        size = max(1, round(width * scale)), max(1, round(height * scale))
+        grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(grey, np.uint8)
+
+
+def backward_flow(current: Grey, previous: Grey, *, search: Search = SEARCH) -> Field:
+    """Where each pixel of `current` was in `previous`, as an offset, by dense inverse search (Kroeger et al. 2016).
+
+    Args:
+        current, previous: (h, w) of one size; below MIN_SIDE the flow is zero.
+        search: how it is sought.
+    """
+    if min(current.shape) < MIN_SIDE:
+        return np.zeros((*current.shape, 2), np.float32)
+    return np.asarray(_dense_inverse_search(search).calc(current, previous, None), np.float32)  # type: ignore[call-overload]
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Where the pixels of the current frame were in a keyframe.
+
+    Args:
+        places: (h, w, 2) pixel of the keyframe's working image; at its nearest border for what came from outside.
+        inside: (h, w) bool: no link of the chain left the image.
+    """
+
+    places: Field
+    inside: Bools
+
+    @classmethod
+    def start(cls, grey: Grey) -> "Chain":
+        """At the keyframe itself: the identity."""
+        height, width = grey.shape
+        return cls(_grid(width, height), np.ones(grey.shape, np.bool_))
+
+    def extended(self, flow: Field) -> "Chain":
+        """The chain one frame later: M_t(x) = M_{t-1}(x + flow(x)); bilinear between pixels.
+
+        Args:
+            flow: (h, w, 2) from the new frame to the one this chain ends at.
+        """
+        height, width = self.inside.shape
+        step = _grid(width, height) + flow
+        places = cv2.remap(self.places, step, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+        inside = cv2.remap(self.inside.view(np.uint8), step, None, cv2.INTER_NEAREST, borderValue=0)  # type: ignore[call-overload]
+        return Chain(np.asarray(places, np.float32), np.asarray(inside, np.uint8).view(np.bool_))
+
+    def carry(self, labels: Labels, confidence: Confidence | None, size: tuple[int, int]) -> Carried:
+        """Labels and confidence of the keyframe as the current frame sees them, by nearest neighbour.
+
+        What came into the image since gets the label of the border where it came in, and is not covered.
+
+        Args:
+            labels, confidence: (H, W) of the keyframe.
+            size: (width, height) of the answer.
+        """
+        places = _full_size(self.places, labels.shape, size)
+        sure = None if confidence is None else _fetched(confidence, places)
+        inside = cv2.resize(self.inside.view(np.uint8), size, interpolation=cv2.INTER_NEAREST_EXACT)
+        return Carried(_fetched(labels, places), sure, np.asarray(inside, np.uint8).view(np.bool_))
+
+    def stays(self, depth: Depth, keyframe: Depth, *, within_m: float) -> Bools:
+        """(H, W) bool: where the chain ends at about the distance it began at, so that it may be one body all along.
+
+        Flow that stuck to the edge of what moves ends on it, while the frame shows what it uncovered, farther away.
+        Where either depth is unknown, it does not.
+
+        Args:
+            depth, keyframe: (H, W) metres of the current frame and of the keyframe.
+            within_m: how far a body may have come nearer or gone away.
+        """
+        height, width = self.inside.shape
+        scale = np.array([keyframe.shape[1] / width, keyframe.shape[0] / height], np.float32)
+        places = (self.places + np.float32(0.5)) * scale - np.float32(0.5)
+        there = cv2.remap(keyframe, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+        here = cv2.resize(depth, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
+        near = np.asarray(np.abs(np.asarray(here, np.float32) - there) <= within_m)
+        full = cv2.resize(near.view(np.uint8), depth.shape[::-1], interpolation=cv2.INTER_NEAREST_EXACT)
+        return np.asarray(full, np.uint8).view(np.bool_)
+
+
+def _full_size(places: Field, shape: tuple[int, ...], size: tuple[int, int]) -> Field:
+    """(H, W, 2) `places` for an answer of `size` (W, H), in pixels of a keyframe of `shape` (H, W)."""
+    height, width = places.shape[:2]
+    if (width, height) == size and (height, width) == shape[:2]:
+        return places
+    scale = np.array([shape[1] / width, shape[0] / height], np.float32)
+    scaled = (places + np.float32(0.5)) * scale - np.float32(0.5)
+    return np.asarray(cv2.resize(scaled, size, interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def _fetched(values: npt.NDArray[Value], places: Field) -> npt.NDArray[Value]:
+    fetched = cv2.remap(values, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+    return np.asarray(fetched, values.dtype)
+
+
+@lru_cache(maxsize=3)
+def _dense_inverse_search(search: Search) -> cv2.DISOpticalFlow:
+    found = cv2.DISOpticalFlow.create(search.preset)
+    if search.finest is not None:
+        found.setFinestScale(search.finest)
+    return found
+
+
+@lru_cache(maxsize=4)
+def _grid(width: int, height: int) -> Field:
+    x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    grid = np.ascontiguousarray(np.stack([x, y], axis=-1))
+    grid.setflags(write=False)
+    return grid

@@ -1,0 +1,125 @@
+"""The exact warp, on scenes whose answer can be written down."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stsem.camera import Camera
+from stsem.chance import generator
+from stsem.classes import NO_LABEL
+from stsem.frame import Depth
+from stsem.geometry.reproject import View, among, correspond
+from stsem.pose import Pose, from_quaternion
+
+CAMERA = Camera(96, 64, 60.0, 62.0, 47.2, 31.4)
+LABELS = generator(0, "labels").integers(0, 13, (64, 96)).astype(np.uint8)
+Rays = npt.NDArray[np.float64]
+
+
+def rays(camera: Camera = CAMERA) -> Rays:
+    """(H, W, 3) directions with z = 1."""
+    x, y = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    return np.stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, np.ones_like(x)], axis=-1)
+
+
+def plane(
+    T_WC: Pose, camera: Camera = CAMERA, normal: tuple[float, ...] = (0.1, -0.2, 1), distance: float = 3.0
+) -> Depth:
+    """Depth of the plane normal . X_W = distance."""
+    n = np.array(normal)
+    along = rays(camera) @ T_WC[:3, :3].T @ n
+    return np.asarray((distance - n @ T_WC[:3, 3]) / along, np.float32)
+
+
+def pose(x: float, y: float, z: float, *q: float) -> Pose:
+    return from_quaternion((x, y, z), q or (0, 0, 0, 1))
+
+
+def fetched(current: View, keyframe: View, labels: npt.NDArray[np.uint8] = LABELS) -> npt.NDArray[np.uint8]:
+    result = np.full(current.depth.shape, NO_LABEL, np.uint8)
+    correspond(current, keyframe).fetch(labels, result)
+    return result
+
+
+def by_definition(current: View, keyframe: View) -> tuple[npt.NDArray[np.uint8], Rays]:
+    """Labels without a test of depth, in float64, pixel by pixel; also how far each pixel was from a tie."""
+    points = rays(current.camera) * current.depth[..., None].astype(np.float64)
+    world = points @ current.T_WC[:3, :3].T + current.T_WC[:3, 3]
+    there = (world - keyframe.T_WC[:3, 3]) @ keyframe.T_WC[:3, :3]
+    image = there @ keyframe.camera.K.T
+    u, v = image[..., 0] / image[..., 2], image[..., 1] / image[..., 2]
+    column, row = np.rint(u).astype(int), np.rint(v).astype(int)
+    inside = (image[..., 2] > 0) & (column >= 0) & (row >= 0) & (column < 96) & (row < 64)
+    result = np.full(current.depth.shape, NO_LABEL, np.uint8)
+    result[inside] = LABELS[row[inside], column[inside]]
+    return result, np.minimum(np.abs(u % 1 - 0.5), np.abs(v % 1 - 0.5))
+
+
+def test_the_same_view_keeps_every_label_that_has_depth() -> None:
+    depth = plane(np.eye(4))
+    depth[10:20, 30:50] = np.nan
+    view = View(depth, pose(4, 5, 6, 0.1, 0.2, 0.3, 0.9), CAMERA)
+    np.testing.assert_array_equal(fetched(view, view), np.where(np.isnan(depth), NO_LABEL, LABELS))
+
+
+@settings(max_examples=25)
+@given(st.tuples(*[st.floats(-0.3, 0.3)] * 3), st.tuples(*[st.floats(-0.15, 0.15)] * 3))
+def test_a_plane_under_known_motion_is_fetched_exactly(moved: tuple[float, ...], turned: tuple[float, ...]) -> None:
+    there, here = pose(0, 0, 0), pose(*moved, *turned, 1)
+    current, keyframe = View(plane(here), here, CAMERA), View(plane(there), there, CAMERA)
+    expected, from_a_tie = by_definition(current, keyframe)
+    clear = from_a_tie > 1e-3
+    np.testing.assert_array_equal(fetched(current, keyframe)[clear], expected[clear])
+    assert (expected != NO_LABEL).mean() > 0.3
+
+
+def test_some_pixels_get_what_all_would() -> None:
+    here, there = pose(0.1, 0, 0.2, 0, 0.05, 0, 1), pose(0, 0, 0)
+    current, keyframe = View(plane(here), here, CAMERA), View(plane(there), there, CAMERA)
+    whole = fetched(current, keyframe)
+    wanted = generator(1, "wanted").random((64, 96)) < 0.3
+    some = np.full_like(whole, NO_LABEL)
+    among(current, keyframe, np.flatnonzero(wanted)).fetch(LABELS, some)
+    np.testing.assert_array_equal(some, np.where(wanted, whole, NO_LABEL))
+    among(current, keyframe, np.empty(0, np.intp)).fetch(LABELS, some)
+    np.testing.assert_array_equal(some, np.where(wanted, whole, NO_LABEL))
+
+
+def test_what_a_nearer_surface_hid_has_no_partner() -> None:
+    """A box 1 m away hides part of a wall at 3 m; 0.5 m to the side one sees the wall behind it."""
+    box, wall = np.s_[20:44, 40:56], np.full((64, 96), 3, np.float32)
+    there, labels = wall.copy(), np.full((64, 96), 1, np.uint8)
+    there[box], labels[box] = 1, 2
+    here = wall.copy()
+    here[20:44, 10:26] = 1  # 0.5 m at 1 m is 30 pixels
+    current, keyframe = View(here, pose(0.5, 0, 0), CAMERA), View(there, pose(0, 0, 0), CAMERA)
+    answer = fetched(current, keyframe, labels)
+    assert (answer[20:44, 10:26] == 2).all()
+    assert not (answer[here == 3] == 2).any()
+    hidden = np.s_[21:43, 31:45]  # where the box stood, seen 10 pixels to the left on the wall
+    assert (answer[hidden] == NO_LABEL).all()
+    assert (answer[:, 86:] == NO_LABEL).all()
+
+
+def test_depth_unknown_in_the_keyframe_gives_no_partner_and_behind_it_neither() -> None:
+    flat = np.full((64, 96), 2, np.float32)
+    unknown = View(np.full_like(flat, np.nan), np.eye(4), CAMERA)
+    assert (fetched(View(flat, np.eye(4), CAMERA), unknown) == NO_LABEL).all()
+    turned_round = View(flat, pose(0, 0, 0, 0, 1, 0, 0), CAMERA)
+    assert (fetched(View(flat, np.eye(4), CAMERA), turned_round) == NO_LABEL).all()
+
+
+def test_frames_of_other_sizes_meet() -> None:
+    half = CAMERA.scaled(48, 32)
+    current, keyframe = View(plane(np.eye(4), half), np.eye(4), half), View(plane(np.eye(4)), np.eye(4), CAMERA)
+    blocks = np.kron(LABELS[:32, :48], np.ones((2, 2), np.uint8))
+    np.testing.assert_array_equal(fetched(current, keyframe, blocks), LABELS[:32, :48])
+
+
+def test_a_camera_that_does_not_fit_is_refused() -> None:
+    with pytest.raises(ValueError, match="undistorted camera"):
+        View(np.ones((10, 10), np.float32), np.eye(4), CAMERA)
+    with pytest.raises(ValueError, match="undistorted camera"):
+        View(np.ones((64, 96), np.float32), np.eye(4), Camera(96, 64, 60, 60, 47, 31, (0.1,), "plumb_bob"))
