@@ -18,7 +18,7 @@ from stsem.stages.register import Registration
 KEPT = 32
 """Keyframes remembered: up to 9 bytes a pixel each, 152 MB in all at 960x540 with what they look like."""
 LIKENED = 16
-"""Of them, those whose points serve as examples: more give nothing, and the search tree of 32 takes 30 ms to build."""
+"""Of them, those whose points serve as examples: 32 are no better on the whole, and their search tree takes 30 ms."""
 SAMPLES = 2048
 """Pixels by which the coverage of a frame is foretold."""
 FLOW_SIDE = 320
