@@ -21,7 +21,7 @@ import numpy as np
 from bench.propagation_parts import Parts
 from stsem.classes import NO_LABEL, ClassSet, Labels
 from stsem.frame import Frame, Segmentation
-from stsem.geometry.carried import Carried
+from stsem.geometry.carried import Carried, Draft
 from stsem.geometry.flow import Search
 from stsem.geometry.reproject import View, correspond
 from stsem.log.log import Log, open_log
@@ -62,8 +62,8 @@ class Bare(Memoryless):
 class Carry(DepthWarp):
     """`depth` without its guesses: what no keyframe saw comes by flow."""
 
-    def _completed(self, seen: Carried, view: View, frame: Frame) -> Carried:
-        return seen
+    def _guessed(self, draft: Draft, view: View, frame: Frame) -> None:
+        pass
 
 
 def _flow(search: Search, side: int, classes: ClassSet) -> Flow:

@@ -18,14 +18,18 @@ TIMED: tuple[tuple[Any, str, str], ...] = (
     (flow_method, "backward_flow", "flow"),
     (flow.Chain, "extended", "chain"),
     (flow.Chain, "carry", "labels by flow"),
-    (depth_method, "carry", "labels by depth, all keyframes"),
+    (flow.Chain, "trace", "labels by flow of some pixels"),
+    (reproject, "filled", "depth in shadows"),
+    (depth_method, "carry", "labels by depth"),
     (carry, "correspond", "- newest keyframe"),
     (reproject, "_search_beside", "  - search beside the pixel"),
-    (carry, "among", "- earlier keyframes"),
+    (carry, "among", "- earlier keyframes, shadows"),
+    (depth_method, "carry_more", "labels in shadows"),
     (depth_method, "described", "description"),
-    (depth_method, "completed", "likeness"),
+    (depth_method, "guess", "likeness"),
     (likeness.Likeness, "votes", "- nearest examples"),
     (likeness, "diffused", "- neighbours"),
+    (likeness, "spread", "- pixels"),
 )
 """(where it is looked up, its name, how it is printed); a dash marks a part of the part above."""
 

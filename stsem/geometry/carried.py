@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from stsem.classes import Labels
+from stsem.classes import NO_LABEL, Labels
 from stsem.uncertainty import Confidence
 
 Bools = npt.NDArray[np.bool_]
@@ -29,3 +29,29 @@ class Carried:
     def coverage(self) -> float:
         """Share of the pixels that are covered, 0..1."""
         return float(np.count_nonzero(self.covered)) / max(1, self.covered.size)
+
+
+@dataclass(eq=False)
+class Draft:
+    """An answer in the making: one source after another fills in what those before it left open, the best first.
+
+    Args:
+        labels: (H, W) uint8, NO_LABEL where it is open.
+        confidence: (H, W) float32; None if the keyframes have none.
+        covered: (H, W) bool: what was said rests on evidence.
+    """
+
+    labels: Labels
+    confidence: Confidence | None
+    covered: Bools
+
+    @classmethod
+    def blank(cls, shape: tuple[int, ...], *, sure: bool) -> "Draft":
+        """Of `shape` (H, W), open everywhere; with room for a confidence if the keyframes are `sure` of something."""
+        confidence = np.zeros(shape, np.float32) if sure else None
+        return cls(np.full(shape, NO_LABEL, np.uint8), confidence, np.zeros(shape, np.bool_))
+
+    @property
+    def open(self) -> Bools:
+        """(H, W) bool: nobody has said anything yet."""
+        return np.asarray(self.labels == NO_LABEL)

@@ -1,17 +1,18 @@
-"""Labels by depth and pose from several keyframes, the rest by flow: what each of them can answer best.
+"""Labels by depth and pose from several keyframes, and by flow: each fills in what those before it left open.
 
-A pixel asks the newest keyframe that saw its point; then earlier ones, newest first; then the chained flow. Classes
-that move by themselves (`moving`) are never carried by geometry, which would leave them where they stood.
+A pixel asks the newest keyframe that saw its point; then earlier ones, newest first. Classes that move by themselves
+(`moving`) are never carried by geometry, which would leave them where they stood: they come by flow.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from stsem.classes import NO_LABEL, ClassSet, Labels, normalised
-from stsem.geometry.carried import Bools, Carried
+from stsem.geometry.carried import Bools, Draft
+from stsem.geometry.flow import Traced
+from stsem.geometry.packed import Rows
 from stsem.geometry.reproject import DEFAULT_AGREEMENT, Agreement, Correspondence, View, among, correspond
 from stsem.uncertainty import Confidence
 
@@ -41,6 +42,10 @@ class Source:
     labels: Labels
     confidence: Confidence | None = None
 
+    def lit(self) -> "Source":
+        """The same keyframe with depth in the shadows of the projector, by guess."""
+        return Source(self.view.lit(), self.labels, self.confidence)
+
     def without(self, moving: Bools) -> "Source":
         """The same keyframe with NO_LABEL for the classes that `moving` (256,) names."""
         labels = np.where(moving[self.labels], np.uint8(NO_LABEL), self.labels)
@@ -55,55 +60,80 @@ def moving_classes(classes: ClassSet) -> Bools:
 
 
 def carry(
-    current: View, sources: Sequence[Source], rest: Carried, *, moving: Bools, max_earlier: int = 8,
+    draft: Draft, current: View, sources: Sequence[Source], *, max_earlier: int = 8,
     agreement: Agreement = DEFAULT_AGREEMENT,
-) -> Carried:  # fmt: skip
-    """Labels for `current` from `sources`, and `rest` where none of them saw the point.
-
-    Covered is what depth covers, and what flow covers of the classes that move.
+) -> None:  # fmt: skip
+    """Fill in what `sources` saw: evidence.
 
     Args:
+        draft: of the size of `current`, still open everywhere.
         current: the frame to label.
         sources: keyframes, the newest first, `without` the moving classes; none is allowed.
-        rest: by flow, of the size of `current`.
-        moving: (256,) bool, as `moving_classes` gives them.
         max_earlier: how many keyframes after the first are asked for what is still missing. Those that would add less
             than MIN_GAIN of the image are passed over and do not count.
         agreement: the test against occlusion.
     """
-    labels = np.full(current.depth.shape, NO_LABEL, np.uint8)
-    confidence = None if rest.confidence is None else rest.confidence.copy()
-    for source, pairs in _asked(current, sources, labels, max_earlier, agreement):
-        pairs.fetch(source.labels, labels)
-        if confidence is not None and source.confidence is not None:
-            pairs.fetch(source.confidence, confidence)
-    holes = labels == NO_LABEL
-    cv2.copyTo(rest.labels, holes.view(np.uint8), labels)
-    if confidence is not None and rest.confidence is not None:
-        cv2.copyTo(rest.confidence, holes.view(np.uint8), confidence)
-    return Carried(labels, confidence, ~holes | (rest.covered & _looked_up(moving, rest.labels)))
-
-
-def _looked_up(table: Bools, labels: Labels) -> Bools:
-    """`table[labels]`, five times as fast."""
-    return np.asarray(cv2.LUT(labels, table.view(np.uint8)), np.uint8).view(np.bool_)
-
-
-def _asked(
-    current: View, sources: Sequence[Source], labels: Labels, max_earlier: int, agreement: Agreement
-) -> Iterator[tuple[Source, Correspondence]]:
-    """Each source with its pairs: of all pixels for the first, then of those that `labels` still lacks."""
     for source in sources[:1]:
-        yield source, correspond(current, source.view, agreement=agreement)
-    if len(sources) < 2:
+        _write(source, correspond(current, source.view, agreement=agreement), draft)
+    carry_more(draft, current, sources[1:], at_most=max_earlier, agreement=agreement)
+    draft.covered |= ~draft.open
+
+
+def carry_more(
+    draft: Draft, current: View, sources: Sequence[Source], *, at_most: int = 8,
+    agreement: Agreement = DEFAULT_AGREEMENT,
+) -> None:  # fmt: skip
+    """Fill in what `sources` say of what is open, the newest first, without calling it evidence; see `carry`.
+
+    Args:
+        draft: of the size of `current`.
+        current: the frame to label.
+        sources: keyframes as for `carry`.
+        at_most: how many of them are asked.
+        agreement: the test against occlusion.
+    """
+    if not sources:
         return
-    asked, flat = 0, labels.reshape(-1)
-    rows = np.flatnonzero((labels == NO_LABEL) & (current.depth > 0))
-    for source in sources[1:]:
-        if asked == max_earlier:
+    asked, flat = 0, draft.labels.reshape(-1)
+    rows = np.flatnonzero(draft.open & (current.depth > 0))
+    for source in sources:
+        if asked == at_most:
             return
         sample = rows[:: max(1, len(rows) // SAMPLES)]
         hits = np.count_nonzero(among(current, source.view, sample, agreement=agreement).found)
-        if hits * len(rows) > MIN_GAIN * labels.size * len(sample):
-            yield source, among(current, source.view, rows, agreement=agreement)
+        if hits * len(rows) > MIN_GAIN * flat.size * len(sample):
+            _write(source, among(current, source.view, rows, agreement=agreement), draft)
             asked, rows = asked + 1, rows[flat.take(rows) == NO_LABEL]
+
+
+def follow(draft: Draft, traced: Traced, *, moving: Bools) -> None:
+    """Fill in what flow covers of the classes that move by themselves: evidence, too.
+
+    Args:
+        draft: open at the pixels that were `traced`.
+        traced: by flow.
+        moving: (256,) bool, as `moving_classes` gives them.
+    """
+    sure = traced.covered & moving[traced.labels]
+    _put(traced, np.flatnonzero(sure), draft)
+    draft.covered.reshape(-1)[traced.rows[sure]] = True
+
+
+def settle(draft: Draft, traced: Traced) -> None:
+    """Fill in what flow says wherever `draft` is still open at the pixels that were `traced`: no evidence."""
+    _put(traced, np.flatnonzero(draft.labels.reshape(-1).take(traced.rows) == NO_LABEL), draft)
+
+
+def _put(traced: Traced, some: Rows, draft: Draft) -> None:
+    """`some` (n,) of the pixels `traced` into `draft`."""
+    at = traced.rows[some]
+    draft.labels.reshape(-1)[at] = traced.labels[some]
+    if draft.confidence is not None and traced.confidence is not None:
+        draft.confidence.reshape(-1)[at] = traced.confidence[some]
+
+
+def _write(source: Source, pairs: Correspondence, draft: Draft) -> None:
+    """What `source` says of the pixels of `pairs`."""
+    pairs.fetch(source.labels, draft.labels)
+    if draft.confidence is not None and source.confidence is not None:
+        pairs.fetch(source.confidence, draft.confidence)

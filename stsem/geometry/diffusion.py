@@ -16,7 +16,7 @@ Votes = npt.NDArray[np.float32]
 """(..., classes) float32: shares of a vote, which sum to 1, or all 0 where nothing is known."""
 Planes = npt.NDArray[np.float32]
 
-STEPS = (8, 4, 2, 1)
+STEPS = (16, 8, 4, 2, 1)
 """Cells between neighbours."""
 WEIGHT = 10.0
 """Of a neighbour that looks the same, against the cell's own votes."""
@@ -38,12 +38,12 @@ def diffused(votes: Votes, asked: Bools, place: Planes, normal: Planes, colour: 
     """
     classes = votes.shape[-1]
     shares, at = votes.reshape(-1, classes).copy(), np.flatnonzero(asked)
-    flat = [part.reshape(-1, 3) for part in (place, normal, colour)]
+    flat = [np.ascontiguousarray(part.reshape(-1, 3).T) for part in (place, normal, colour)]
     own = shares[at]
     for step in STEPS:
         total, weights = own.copy(), np.ones(len(at), np.float32)
         for here, beside in _neighbours(asked.shape, at, step):
-            weight = _likeness(*((part[at[here]], part[beside]) for part in flat))
+            weight = _likeness(*((part[:, at[here]], part[:, beside]) for part in flat))
             weight *= shares[beside].any(axis=1)
             total[here] += weight[:, None] * shares[beside]
             weights[here] += weight
@@ -64,8 +64,13 @@ def _neighbours(
 
 
 def _likeness(place: tuple[Planes, Planes], normal: tuple[Planes, Planes], colour: tuple[Planes, Planes]) -> Planes:
-    """(n,) WEIGHT for pairs of one colour and plane, less for others; 0 where a place is unknown."""
+    """(n,) for pairs of (3, n): WEIGHT for one colour and plane, less for others; 0 where a place is unknown."""
     apart, other = place[1] - place[0], colour[1] - colour[0]
-    off = np.maximum(*(np.abs((apart * one).sum(axis=1)) for one in normal)) / np.float32(PLANE_M)
-    colours = (other * other).sum(axis=1) / np.float32(COLOUR * COLOUR)
-    return np.asarray(np.nan_to_num(np.float32(WEIGHT) * np.exp(-colours - off * off)), np.float32)
+    off = np.maximum(*(np.abs(_dot(apart, one)) for one in normal)) / np.float32(PLANE_M)
+    colours = _dot(other, other) / np.float32(COLOUR * COLOUR)
+    return np.asarray(np.nan_to_num(np.float32(WEIGHT) * np.exp(-colours - off * off), copy=False), np.float32)
+
+
+def _dot(one: Planes, other: Planes) -> Planes:
+    """(n,) of two (3, n)."""
+    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from stsem.classes import Labels
 from stsem.frame import Depth, Image
 from stsem.geometry.carried import Bools, Carried
+from stsem.geometry.packed import Rows, packed
 from stsem.uncertainty import Confidence
 
 Value = TypeVar("Value", np.uint8, np.float32)
@@ -69,6 +70,23 @@ def backward_flow(current: Grey, previous: Grey, *, search: Search = SEARCH) -> 
 
 
 @dataclass(frozen=True, eq=False)
+class Traced:
+    """What flow says of some pixels.
+
+    Args:
+        rows: (n,) the pixels, counted row by row.
+        labels: (n,) uint8.
+        confidence: (n,) float32, or None.
+        covered: (n,) bool: it rests on evidence.
+    """
+
+    rows: Rows
+    labels: Labels
+    confidence: Confidence | None
+    covered: Bools
+
+
+@dataclass(frozen=True, eq=False)
 class Chain:
     """Where the pixels of the current frame were in a keyframe.
 
@@ -112,24 +130,39 @@ class Chain:
         inside = cv2.resize(self.inside.view(np.uint8), size, interpolation=cv2.INTER_NEAREST_EXACT)
         return Carried(_fetched(labels, places), sure, np.asarray(inside, np.uint8).view(np.bool_))
 
-    def stays(self, depth: Depth, keyframe: Depth, *, within_m: float) -> Bools:
-        """(H, W) bool: where the chain ends at about the distance it began at, so that it may be one body all along.
+    def trace(
+        self, rows: Rows, labels: Labels, confidence: Confidence | None, depths: tuple[Depth, Depth], *, within_m: float
+    ) -> Traced:
+        """What `carry` says of some pixels, covered only where the chain ends at about the distance it began at.
 
         Flow that stuck to the edge of what moves ends on it, while the frame shows what it uncovered, farther away.
-        Where either depth is unknown, it does not.
+        Where either depth is unknown, it is not covered.
 
         Args:
-            depth, keyframe: (H, W) metres of the current frame and of the keyframe.
+            rows: (n,) of the answer, counted row by row.
+            labels, confidence: (H, W) of the keyframe.
+            depths: metres, (H, W) each: of the current frame and of the keyframe; the answer has the size of the first.
             within_m: how far a body may have come nearer or gone away.
         """
-        height, width = self.inside.shape
-        scale = np.array([keyframe.shape[1] / width, keyframe.shape[0] / height], np.float32)
-        places = (self.places + np.float32(0.5)) * scale - np.float32(0.5)
-        there = cv2.remap(keyframe, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
-        here = cv2.resize(depth, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
-        near = np.asarray(np.abs(np.asarray(here, np.float32) - there) <= within_m)
-        full = cv2.resize(near.view(np.uint8), depth.shape[::-1], interpolation=cv2.INTER_NEAREST_EXACT)
-        return np.asarray(full, np.uint8).view(np.bool_)
+        if not len(rows):
+            return Traced(rows, labels[:0, 0], None if confidence is None else confidence[:0, 0], np.zeros(0, np.bool_))
+        (current, keyframe), (height, width) = depths, self.inside.shape
+        some = packed(rows)
+        y, x = np.divmod(some.astype(np.int32), np.int32(current.shape[1]))
+        here = np.stack([_scaled(x, width / current.shape[1]), _scaled(y, height / current.shape[0])], axis=-1)
+        at = cv2.remap(self.places, here, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
+        places = _scaled(at, np.array([keyframe.shape[1] / width, keyframe.shape[0] / height], np.float32))
+        inside = _fetched(self.inside.view(np.uint8), here).view(np.bool_)
+        apart = np.abs(_fetched(keyframe, places) - current.reshape(-1)[some])
+        count = np.s_[: len(rows)]
+        sure = None if confidence is None else _fetched(confidence, places).reshape(-1)[count]
+        covered = np.asarray(inside & (apart <= within_m)).reshape(-1)[count]
+        return Traced(rows, _fetched(labels, places).reshape(-1)[count], sure, covered)
+
+
+def _scaled(pixels: npt.NDArray[np.float32] | npt.NDArray[np.int32], scale: npt.NDArray[np.float32] | float) -> Field:
+    """`pixels` of one image in those of another that is `scale` times as large; middles of pixels are whole numbers."""
+    return np.asarray((pixels + np.float32(0.5)) * scale - np.float32(0.5), np.float32)
 
 
 def _full_size(places: Field, shape: tuple[int, ...], size: tuple[int, int]) -> Field:
@@ -138,8 +171,7 @@ def _full_size(places: Field, shape: tuple[int, ...], size: tuple[int, int]) -> 
     if (width, height) == size and (height, width) == shape[:2]:
         return places
     scale = np.array([shape[1] / width, shape[0] / height], np.float32)
-    scaled = (places + np.float32(0.5)) * scale - np.float32(0.5)
-    return np.asarray(cv2.resize(scaled, size, interpolation=cv2.INTER_LINEAR), np.float32)
+    return np.asarray(cv2.resize(_scaled(places, scale), size, interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 def _fetched(values: npt.NDArray[Value], places: Field) -> npt.NDArray[Value]:

@@ -1,8 +1,8 @@
 """Labels for what no keyframe saw: those of the most similar points that keyframes did see.
 
 Floors, walls and ceilings go on where the image of a keyframe ended, a chair looks like the chair beside it, and a
-person keeps the colour of the clothes. So each point is described by place, height, direction of the surface and
-colour, and takes the label that its nearest neighbours among the labelled points vote for, a neighbour at the distance
+person keeps the colour of the clothes. So each cell is described by place, height, direction of the surface, colour and
+texture, and takes the label that its nearest neighbours among the labelled cells vote for, a neighbour at the distance
 d with the weight 1 / (d + SOFT) (after Dudani 1976), and that those beside it on the same surface vote for. It is a
 guess, never evidence: what it labels stays uncovered.
 """
@@ -11,63 +11,37 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from stsem.classes import NO_LABEL, Labels
-from stsem.frame import Image
-from stsem.geometry.carried import Bools, Carried
+from stsem.geometry.carried import Bools, Draft
+from stsem.geometry.cells import Cells, Direction
 from stsem.geometry.diffusion import Votes, diffused
-from stsem.geometry.reproject import View
+from stsem.geometry.joint import Guess, spread
+from stsem.geometry.reproject import View, looked_past
 
 Features = npt.NDArray[np.float32]
-"""(..., 9): place in the world, normal of the surface, colour in L*a*b*, each in units of its scale below."""
+"""(..., 10) float32: place in the world, normal of the surface, colour, texture, each in units of its scale below."""
+Cubes = npt.NDArray[np.int64]
 
-Direction = npt.NDArray[np.float64]
-
-CELLS = 120
-"""Points along the longer side of an image; a frame is described and guessed in cells, not pixels."""
-EVERY = 2
-"""Every so many cells of a keyframe become examples, along both sides."""
-PLACE_M, HEIGHT_M, NORMAL, COLOUR = 1.0, 0.3, 0.5, 20.0
-"""What counts as a distance of 1: metres, length of the difference of unit normals, levels of 8-bit L*a*b*."""
-LIGHTNESS = 0.5
-"""Weight of L* against a* and b*: shade tells less than colour."""
-VOTERS = 5
+SPACING_M = 0.2
+"""Of the examples in one cube of this side, only those of the newest keyframe that has some there are kept."""
+PLACE_M, HEIGHT_M, NORMAL = 4.0, 0.15, 1.2
+"""What counts as a distance of 1: metres, length of the difference of unit normals."""
+LIGHTNESS, COLOUR = 12.5, 3.2
+"""The same for colour, in levels of 8-bit L*a*b*, L* as `Cells` weigh it: much the most telling of all."""
+TEXTURE = 0.6
+"""The same for the logarithm of one plus the standard deviation of grey within a cell."""
+CLEARANCE_M = 0.3
+"""How much farther a keyframe must have seen, for what is now there to have come since."""
+NOBODY = 1e-3
+"""Votes that each moving class has anyway, if no example of one resembles what came."""
+VOTERS = 3
 SOFT = 0.1
 SLACK = 0.5
 """A voter may be up to this share farther away than the true one: 0.2 % of the votes change, in a third of the time."""
-
-
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """What a frame looks like, cell by cell.
-
-    Args:
-        features: (h, w, 9) of the middle of each cell, the colour a mean over the cell.
-        up: (3,) in the world, where the top of the image is.
-        known: (h, w) bool: the middle has depth.
-        side: pixels along a cell; the image may be up to side - 1 pixels wider and higher than all cells.
-    """
-
-    features: Features
-    up: Direction
-    known: Bools
-    side: int
-
-    def middles(self, values: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
-        """(h, w) of `values` (H, W) in the middle of each cell."""
-        height, width = self.known.shape
-        return values[self.side // 2 :: self.side, self.side // 2 :: self.side][:height, :width]
-
-    def spread(self, values: Labels, shape: tuple[int, ...]) -> Labels:
-        """(H, W) `shape` of `values` (h, w): each pixel takes that of its cell, the last ones that of the nearest."""
-        height, width = self.known.shape[0] * self.side, self.known.shape[1] * self.side
-        spread = cv2.resize(values, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
-        below, right = shape[0] - height, shape[1] - width
-        return np.asarray(cv2.copyMakeBorder(spread, 0, below, 0, right, cv2.BORDER_REPLICATE), np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,22 +49,28 @@ class Examples:
     """Points of a keyframe with their labels.
 
     Args:
-        features: (n, 9).
+        features: (n, 10).
         labels: (n,) uint8, none of them NO_LABEL.
+        cubes: (n,) in which cube of space each of them is.
         up: (3,) in the world, where the top of the image was.
     """
 
     features: Features
     labels: Labels
+    cubes: Cubes
     up: Direction
 
     @classmethod
     def of(cls, cells: Cells, labels: Labels) -> "Examples":
         """Of a keyframe that looks like `cells`, with `labels` (H, W); persons too, who are told by their colour."""
-        some = np.s_[EVERY // 2 :: EVERY, EVERY // 2 :: EVERY]
-        at = np.asarray(cells.middles(labels), np.uint8)[some]
-        usable = cells.known[some] & (at != NO_LABEL)
-        return cls(cells.features[some][usable], at[usable], cells.up)
+        at = np.asarray(cells.middles(labels), np.uint8)
+        usable = cells.known & (at != NO_LABEL)
+        return cls(features_of(cells, usable), at[usable], _cubes(cells.place[usable]), cells.up)
+
+    def without(self, newer: "Examples") -> "Examples":
+        """Those in cubes where `newer` has none."""
+        stay = np.isin(self.cubes, newer.cubes, invert=True)
+        return Examples(self.features[stay], self.labels[stay], self.cubes[stay], self.up)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +88,7 @@ class Likeness:
     slack: float = SLACK
 
     def votes(self, features: Features, classes: int) -> Votes:
-        """(n, classes) shares of the votes for `features` (n, 9); there must be at least one example.
+        """(n, classes) shares of the votes for `features` (n, 10); there must be at least one example.
 
         Args:
             features: of the points asked for.
@@ -139,7 +119,7 @@ class Likeness:
         return cKDTree(self._with_height(features), balanced_tree=False)
 
     def _with_height(self, features: Features) -> Features:
-        """(n, 10)."""
+        """(n, 11)."""
         x, y, z = np.sum([some.up for some in self.examples], axis=0)
         scale = PLACE_M / HEIGHT_M / max(float(np.sqrt(x * x + y * y + z * z)), 1e-6)
         height = features[:, 0] * (scale * x) + features[:, 1] * (scale * y) + features[:, 2] * (scale * z)
@@ -149,70 +129,75 @@ class Likeness:
         return len(self._labels)
 
 
-def described(view: View, image: Image) -> Cells:
-    """The cells of a frame.
+@dataclass(frozen=True, eq=False)
+class Movers:
+    """What stands where a keyframe saw past must have come since: it is of a class that moves by itself.
 
     Args:
-        view: its depth, pose and camera.
-        image: (H, W, 3) of the size of its depth.
-
-    Raises:
-        ValueError: they differ in size.
+        moving: (256,) bool: the ids of these classes.
+        keyframe: a recent one; None if there is none.
     """
-    height, width = view.depth.shape
-    if image.shape[:2] != (height, width):
-        raise ValueError(f"the image {image.shape[:2]} must have the size of its depth {view.depth.shape}")
-    side = max(1, min(round(max(height, width) / CELLS), height, width))
-    rows, columns = height // side, width // side
-    middle = np.s_[side // 2 :: side, side // 2 :: side]
-    x, y = np.arange(columns) * side + side // 2, np.arange(rows) * side + side // 2
-    depth = view.depth[middle][:rows, :columns]
-    place = _placed(view, x.astype(np.float32)[None, :], y.astype(np.float32)[:, None], depth)
-    colour = cv2.resize(image[: rows * side, : columns * side], (columns, rows), interpolation=cv2.INTER_AREA)
-    lab = cv2.cvtColor(colour, cv2.COLOR_RGB2LAB).astype(np.float32) / np.float32(COLOUR)
-    lab[..., 0] *= np.float32(LIGHTNESS)
-    features = np.concatenate([place / np.float32(PLACE_M), _normals(place) / np.float32(NORMAL), lab], axis=2)
-    return Cells(features, -view.T_WC[:3, 1], np.asarray(depth > 0, np.bool_), side)
+
+    moving: Bools
+    keyframe: View | None
+
+    @property
+    def classes(self) -> int:
+        """One more than the highest id."""
+        return int(np.flatnonzero(self.moving).max(initial=-1)) + 1
+
+    def only(self, votes: Votes, cells: Cells, asked: Bools) -> Votes:
+        """`votes` (n, classes) of the cells `asked` for, of what has come those for moving classes alone."""
+        if self.keyframe is None or not self.moving.any():
+            return votes
+        came = looked_past(cells.view, self.keyframe, cells.pixels(asked), clearance_m=CLEARANCE_M)
+        moving = self.moving[: votes.shape[1]]
+        theirs, found = (votes[came] + NOBODY) * moving, votes.copy()
+        found[came] = theirs / theirs.sum(axis=1, keepdims=True)
+        return found
 
 
-def completed(answer: Carried, cells: Cells, likeness: Likeness) -> Carried:
-    """`answer` with a guess for what it does not cover; where a cell has no depth, it stays as it is.
+def features_of(cells: Cells, some: Bools) -> Features:
+    """(n, 10) of the n true of `some` (h, w)."""
+    scale = np.array([1 / LIGHTNESS, 1 / COLOUR, 1 / COLOUR], np.float32)
+    return np.column_stack([
+        cells.place[some] / np.float32(PLACE_M), cells.normal[some] / np.float32(NORMAL), cells.colour[some] * scale,
+        np.log1p(cells.texture[some]) / np.float32(TEXTURE),
+    ])  # fmt: skip
 
-    The confidence of a guess is its share of the votes.
+
+def guess(draft: Draft, cells: Cells, likeness: Likeness, movers: Movers) -> None:
+    """Fill in what is open with a guess; pixels without depth stay open.
+
+    The confidence of a guess is its share of the votes, or that of the labelled cell that it is taken from.
 
     Args:
-        answer: of the size of the frame that `cells` describe.
+        draft: of the size of the frame.
+        cells: of the frame.
         likeness: of the keyframes; without examples, nothing is guessed.
+        movers: what cannot have stood there before.
     """
-    asked = cells.known & ~np.asarray(cells.middles(answer.covered), np.bool_)
-    if not len(likeness) or not asked.any():
-        return answer
-    votes = _votes(answer, cells, likeness, asked)
-    guessed, share = np.full(asked.shape, NO_LABEL, np.uint8), np.zeros(asked.shape, np.float32)
-    guessed[asked], share[asked] = votes.argmax(axis=1), votes.max(axis=1)
-    spread = cells.spread(guessed, answer.labels.shape)
-    here = ((spread != NO_LABEL) & ~answer.covered).view(np.uint8)
-    labels, confidence = answer.labels.copy(), answer.confidence
-    cv2.copyTo(spread, here, labels)
-    if confidence is not None:
-        steps, confidence = cells.spread(np.rint(share * 255).astype(np.uint8), labels.shape), confidence.copy()
-        cv2.copyTo(steps.astype(np.float32) / np.float32(255), here, confidence)
-    return Carried(labels, confidence, answer.covered)
+    labels = np.asarray(cells.middles(draft.labels), np.uint8)
+    asked = cells.known & (labels == NO_LABEL)
+    if not len(likeness):
+        return
+    labels, sure = labels.copy(), np.zeros(asked.shape, np.float32)
+    if draft.confidence is not None:
+        sure[:] = cells.middles(draft.confidence)
+    if asked.any():
+        votes = _votes(labels, cells, likeness, movers, asked)
+        labels[asked], sure[asked] = votes.argmax(axis=1), votes.max(axis=1)
+    spread(Guess(labels, sure, cells), draft)
 
 
-def _votes(answer: Carried, cells: Cells, likeness: Likeness, asked: Bools) -> Votes:
+def _votes(labels: Labels, cells: Cells, likeness: Likeness, movers: Movers, asked: Bools) -> Votes:
     """(n, classes) for the cells `asked` for: the votes of their likes, and of what lies beside them."""
-    labels = np.asarray(cells.middles(answer.labels), np.uint8)
-    seen = cells.known & ~asked & (labels != NO_LABEL)
-    classes = max(likeness.classes, int(labels[seen].max(initial=0)) + 1)
+    seen = cells.known & (labels != NO_LABEL)
+    classes = max(likeness.classes, movers.classes, int(labels[seen].max(initial=0)) + 1)
     votes = np.zeros((*asked.shape, classes), np.float32)
     votes[seen, labels[seen]] = 1
-    votes[asked] = likeness.votes(cells.features[asked], classes)
-    place, normal, colour = (
-        cells.features[..., first : first + 3] * np.float32(scale)
-        for first, scale in ((0, PLACE_M), (3, NORMAL), (6, COLOUR))
-    )
-    return diffused(votes, asked, place, normal, colour)
+    votes[asked] = movers.only(likeness.votes(features_of(cells, asked), classes), cells, asked)
+    return diffused(votes, asked, cells.place, cells.normal, cells.colour)
 
 
 def remembered(examples: Sequence[Examples]) -> Likeness:
@@ -220,26 +205,7 @@ def remembered(examples: Sequence[Examples]) -> Likeness:
     return Likeness(tuple(examples))
 
 
-def _placed(view: View, x: Features, y: Features, depth: npt.NDArray[np.float32]) -> Features:
-    """(h, w, 3) metres in the world: X = R z K^-1 (u, v, 1) + t; not finite where depth is unknown."""
-    ray = (view.T_WC[:3, :3] @ np.linalg.inv(view.camera.K)).astype(np.float32)
-    known = np.where(depth > 0, depth, np.float32(np.nan))
-    # Written out instead of a matrix product: BLAS may round differently with other thread counts.
-    return np.stack(
-        [(a * x + b * y + c) * known + np.float32(t) for (a, b, c), t in zip(ray, view.T_WC[:3, 3], strict=True)], -1
-    )
-
-
-def _normals(place: Features) -> Features:
-    """(h, w, 3) unit normals, towards the camera; zero where a neighbour is unknown."""
-    if min(place.shape[:2]) < 2:
-        return np.zeros_like(place)
-    down, right = np.gradient(place, axis=0), np.gradient(place, axis=1)
-    (a, b, c), (d, e, f) = np.moveaxis(down, 2, 0), np.moveaxis(right, 2, 0)
-    x, y, z = b * f - c * e, c * d - a * f, a * e - b * d
-    length = np.sqrt(x * x + y * y + z * z)
-    known = length > 0
-    length[~known] = 1
-    return np.asarray(
-        np.stack([np.where(known, axis / length, np.float32(0)) for axis in (x, y, z)], axis=2), np.float32
-    )
+def _cubes(places: Features) -> Cubes:
+    """(n,) a number for the cube of SPACING_M that each of `places` (n, 3), metres, is in: 21 bits an axis."""
+    x, y, z = np.floor(places.T.astype(np.float64) / SPACING_M).astype(np.int64) & 0x1FFFFF
+    return np.asarray(x << 42 | y << 21 | z)

@@ -14,6 +14,8 @@ import numpy.typing as npt
 
 from stsem.camera import Camera
 from stsem.frame import Depth
+from stsem.geometry.packed import Rows, packed
+from stsem.geometry.shadow import filled
 from stsem.pose import Pose, inverse
 
 Bools = npt.NDArray[np.bool_]
@@ -22,10 +24,8 @@ Places = npt.NDArray[np.int16]
 """(h, w, 2) int16 column and row of the keyframe."""
 Pixels = tuple[Float32, Float32, Float32]
 """Column, row and depth of some pixels; they broadcast to the shape (h, w) of the depths."""
-Rows = npt.NDArray[np.intp]
 Value = TypeVar("Value", np.uint8, np.float32)
 
-PACKED_WIDTH = 256
 STRIP_PIXELS = 1 << 15
 NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """(column, row) steps to the pixels beside one, in the order in which they are tried."""
@@ -56,6 +56,10 @@ class View:
                 f"depth {self.depth.shape} must have the size of an undistorted camera, but it is {size}, "
                 f"distortion {self.camera.distortion}"
             )
+
+    def lit(self) -> "View":
+        """The same frame with depth in the shadows of the projector, by guess."""
+        return View(filled(self.depth), self.T_WC, self.camera)
 
 
 @dataclass(frozen=True)
@@ -121,23 +125,32 @@ def among(current: View, keyframe: View, rows: Rows, *, agreement: Agreement = D
     """`correspond` for the pixels `rows` (n,) of the current frame, counted row by row; none beside is tried."""
     if not len(rows):
         return Correspondence(np.empty((0, 1, 2), np.int16), np.empty((0, 1), np.bool_), rows)
-    packed = _packed(rows)
-    pixels = _pixels(current, packed)
-    return Correspondence(*_partners(pixels, current, keyframe, agreement), rows=packed.reshape(-1))
+    some = packed(rows)
+    pixels = _pixels(current, some)
+    return Correspondence(*_partners(pixels, current, keyframe, agreement), rows=some.reshape(-1))
 
 
-def _packed(rows: Rows) -> Rows:
-    """(h, w) of `rows` (n,), the last one repeated at the end."""
-    width = min(PACKED_WIDTH, len(rows))
-    packed = np.full((-(-len(rows) // width), width), rows[-1])
-    packed.reshape(-1)[: len(rows)] = rows
-    return packed
+def looked_past(current: View, keyframe: View, rows: Rows, *, clearance_m: float) -> Bools:
+    """(n,) bool for the pixels `rows` (n,) of `current`: the keyframe saw something farther away where they are now.
+
+    Args:
+        current, keyframe: the two frames.
+        rows: counted row by row.
+        clearance_m: how much farther away, in metres.
+    """
+    if not len(rows):
+        return np.zeros(0, np.bool_)
+    some = packed(rows)
+    u, v, z = _projected(_pixels(current, some), _matrix(current, keyframe))
+    partners, _ = cv2.convertMaps(u, v, cv2.CV_16SC2, nninterpolation=True)
+    there = cv2.remap(keyframe.depth, partners, None, cv2.INTER_NEAREST, borderValue=np.nan)  # type: ignore[call-overload]
+    return np.asarray((z > 0) & (there - z > clearance_m)).reshape(-1)[: len(rows)]
 
 
-def _pixels(view: View, packed: Rows) -> Pixels:
-    """Column, row and depth, (h, w) each, of the pixels `packed` (h, w)."""
-    y, x = np.divmod(packed.astype(np.int32), np.int32(view.camera.width))
-    return x.astype(np.float32), y.astype(np.float32), view.depth.reshape(-1).take(packed)
+def _pixels(view: View, some: Rows) -> Pixels:
+    """Column, row and depth, (h, w) each, of the pixels `some` (h, w)."""
+    y, x = np.divmod(some.astype(np.int32), np.int32(view.camera.width))
+    return x.astype(np.float32), y.astype(np.float32), view.depth.reshape(-1).take(some)
 
 
 def _matrix(current: View, keyframe: View) -> Float32:
@@ -215,10 +228,10 @@ def _search_beside(
     """
     if not len(rows):
         return
-    packed, pairs = _packed(rows), partners.view(np.int32).reshape(-1)
-    _, _, z = _projected(_pixels(current, packed), _matrix(current, keyframe))
-    limit, here = _limit(z, agreement), pairs[packed].view(np.int16).reshape(*packed.shape, 2)
-    best, agreed = here.copy(), np.zeros(packed.shape, np.bool_)
+    some, pairs = packed(rows), partners.view(np.int32).reshape(-1)
+    _, _, z = _projected(_pixels(current, some), _matrix(current, keyframe))
+    limit, here = _limit(z, agreement), pairs[some].view(np.int16).reshape(*some.shape, 2)
+    best, agreed = here.copy(), np.zeros(some.shape, np.bool_)
     for step in NEIGHBOURS[::-1]:
         there = here + np.array(step, np.int16)
         agrees = _agrees(keyframe.depth, there, z, limit)
@@ -226,5 +239,5 @@ def _search_beside(
         agreed |= agrees
     height, width = keyframe.depth.shape
     agreed &= cv2.inRange(here, (0, 0), (width - 1, height - 1)) > 0
-    hits = packed[agreed]
+    hits = some[agreed]
     pairs[hits], found.reshape(-1)[hits] = best.view(np.int32)[..., 0][agreed], True

@@ -26,6 +26,8 @@ def test_it_is_what_a_loop_over_cells_gives() -> None:
     votes[~asked & (rng.random((20, 23)) < 0.3)] = 0
     place, normal, colour = wall(20, 23)
     place[..., 2] += rng.random((20, 23), np.float32) * 0.3
+    normal[..., :2] += rng.random((20, 23, 2), np.float32) - 0.5
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     colour += rng.random((20, 23, 3), np.float32) * 20
     expected = votes.astype(np.float64)
     for step in STEPS:
@@ -34,12 +36,32 @@ def test_it_is_what_a_loop_over_cells_gives() -> None:
             total, weights = votes[y, x].astype(np.float64), 1.0
             for v, u in ((y + step, x), (y - step, x), (y, x + step), (y, x - step)):
                 if 0 <= v < 20 and 0 <= u < 23 and before[v, u].any():
-                    off = abs(float(place[v, u, 2]) - float(place[y, x, 2])) / PLANE_M
+                    way = place[v, u].astype(np.float64) - place[y, x]
+                    off = max(abs(float(way @ normal[y, x])), abs(float(way @ normal[v, u]))) / PLANE_M
                     apart = float(((colour[v, u] - colour[y, x]) ** 2).sum()) / COLOUR**2
                     weight = WEIGHT * math.exp(-apart - off * off)
                     total, weights = total + weight * before[v, u], weights + weight
             expected[y, x] = total / weights
     np.testing.assert_allclose(diffused(votes, asked, place, normal, colour), expected[asked], atol=1e-5)
+
+
+def test_evidence_reaches_as_far_as_the_steps_sum_up_to() -> None:
+    """From the two cells at one end of a row to all that are so far away, and to none farther."""
+    place, normal, colour = wall(1, 40)
+    votes, asked = np.full((1, 40, 2), 0.5, np.float32), np.ones((1, 40), np.bool_)
+    votes[0, :2], asked[0, :2] = (1, 0), False
+    reached = diffused(votes, asked, place, normal, colour)[:, 0] > 0.5 + 1e-5
+    np.testing.assert_array_equal(reached, np.arange(2, 40) <= 1 + sum(STEPS))
+    assert sum(STEPS) == 31
+
+
+def test_what_is_given_is_left_alone() -> None:
+    given = (np.full((6, 9, 2), 0.5, np.float32), np.ones((6, 9), np.bool_), *wall(6, 9))
+    given[0][0, 0], given[1][0, 0], given[2][2, 3] = (1, 0), False, np.nan
+    before = [part.copy() for part in given]
+    diffused(*given)
+    for part, was in zip(given, before, strict=True):
+        np.testing.assert_array_equal(part, was)
 
 
 def test_evidence_goes_along_a_surface_and_stops_at_its_edge() -> None:

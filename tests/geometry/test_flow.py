@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from stsem.chance import generator
@@ -12,6 +12,7 @@ from stsem.geometry.flow import Chain, backward_flow, working_grey
 
 LABELS = generator(0, "labels").integers(0, 13, (64, 96)).astype(np.uint8)
 GREY = np.zeros((64, 96), np.uint8)
+EVERYWHERE = np.arange(64 * 96)
 
 
 def flow(x: float, y: float) -> npt.NDArray[np.float32]:
@@ -68,18 +69,119 @@ def test_what_came_in_gets_the_label_of_the_border() -> None:
     assert carried.coverage == pytest.approx(86 / 96)
 
 
+def wavy(seed: int) -> npt.NDArray[np.float32]:
+    """Flow in eighths of a pixel, another one at each: two links of it add up without rounding."""
+    return generator(seed, "wavy").integers(-40, 41, (64, 96, 2)).astype(np.float32) / 8
+
+
+def depths(seed: int, times: int = 1) -> npt.NDArray[np.float32]:
+    """(64, 96), or so many `times` as large: a few distances and some that are unknown."""
+    some = np.array([1, 1.25, 1.5, 1.75, 2, np.nan], np.float32)
+    return np.asarray(some[generator(seed, "depths").integers(0, len(some), (64 * times, 96 * times))])
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.integers(0, 1000), st.one_of(st.integers(1, 40), st.integers(250, 260), st.integers(500, 6144)),
+    st.tuples(st.sampled_from((1, 2)), st.sampled_from((1, 2))),
+)  # fmt: skip
+@example(0, 6144, (1, 1))
+@example(0, 6144, (2, 1))
+@example(0, 6144, (1, 2))
+def test_some_pixels_are_traced_to_what_all_are_carried_from(seed: int, count: int, times: tuple[int, int]) -> None:
+    """Answer and keyframe are so many `times` as large as the working image; twice is exact in binary, too.
+
+    Covered are the pixels that stayed inside and end at about the distance that they began at.
+    """
+    chain, size = Chain.start(GREY).extended(wavy(seed)).extended(wavy(seed + 1)), (96 * times[0], 64 * times[0])
+    rows = np.sort(generator(seed, "rows").permutation(size[0] * size[1])[:count])
+    here, there = depths(seed, times[0]), depths(seed + 1, times[1])
+    labels = generator(seed, "labels").integers(0, 256, there.shape).astype(np.uint8)
+    sure = generator(seed, "sure").random(there.shape, np.float32)
+    traced = chain.trace(rows, labels, sure, (here, there), within_m=0.5)
+    whole, distance = chain.carry(labels, sure, size), chain.carry(labels, there, size).confidence
+    assert whole.confidence is not None
+    assert traced.confidence is not None
+    np.testing.assert_array_equal(traced.rows, rows)
+    np.testing.assert_array_equal(traced.labels, whole.labels.reshape(-1)[rows])
+    np.testing.assert_array_equal(traced.confidence, whole.confidence.reshape(-1)[rows])
+    covered = whole.covered & (np.abs(distance - here) <= 0.5)
+    np.testing.assert_array_equal(traced.covered, covered.reshape(-1)[rows])
+    assert (traced.labels.dtype, traced.confidence.dtype, traced.covered.dtype) == (np.uint8, np.float32, np.bool_)
+
+
+def test_what_left_the_image_is_not_covered_though_its_distance_agrees() -> None:
+    flat = np.full((64, 96), 3, np.float32)
+    traced = Chain.start(GREY).extended(flow(10, 0)).trace(EVERYWHERE, LABELS, None, (flat, flat), within_m=0.5)
+    np.testing.assert_array_equal(traced.covered, EVERYWHERE % 96 < 86)
+    assert traced.confidence is None
+
+
+@pytest.mark.parametrize(("end", "covered"), [(2.4, False), (2.6, True), (3, True), (3.4, True), (3.6, False)])
+def test_a_body_may_come_nearer_or_go_away_by_so_much(end: float, covered: bool) -> None:
+    here, there = np.full((64, 96), 3, np.float32), np.full((64, 96), end, np.float32)
+    traced = Chain.start(GREY).trace(EVERYWHERE, LABELS, None, (here, there), within_m=0.5)
+    assert (traced.covered == covered).all()
+
+
+def test_where_either_depth_is_unknown_it_is_not_covered() -> None:
+    here, there = np.full((64, 96), 3, np.float32), np.full((64, 96), 3, np.float32)
+    here[10:20, 10:20] = there[15:25, 40:50] = np.nan
+    here[50, 50] = there[50, 50] = np.nan
+    traced = Chain.start(GREY).trace(EVERYWHERE, LABELS, None, (here, there), within_m=0.5)
+    np.testing.assert_array_equal(traced.covered, ~np.isnan(here + there).reshape(-1))
+    np.testing.assert_array_equal(traced.labels, LABELS.reshape(-1))
+
+
 def test_a_chain_stays_with_a_body_and_not_with_what_it_uncovers() -> None:
-    """A body 2 m away goes one pixel to the right before a wall at 5 m; flow that stuck says that it grew."""
+    """A body 2 m away goes two pixels to the right before a wall at 5 m; flow that stuck says that it grew."""
     keyframe, depth = np.full((40, 60), 5, np.float32), np.full((40, 60), 5, np.float32)
     keyframe[10:30, 20:30] = depth[10:30, 22:32] = 2
-    depth[:2, :2] = np.nan
-    stuck = np.zeros((20, 30, 2), np.float32)
-    stuck[5:15, 11:16] = (-1, 0)
-    stays = Chain.start(np.zeros((20, 30), np.uint8)).extended(stuck).stays(depth, keyframe, within_m=0.5)
-    expected = np.ones((40, 60), np.bool_)
-    expected[:2, :2] = False
-    expected[10:30, 20:22] = False
-    assert (stays == expected).all()
+    labels = np.where(keyframe == 2, np.uint8(7), np.uint8(1))
+    stuck = np.zeros((40, 60, 2), np.float32)
+    stuck[10:30, 22:32] = (-2, 0)
+    chain = Chain.start(np.zeros((40, 60), np.uint8)).extended(stuck)
+    traced = chain.trace(np.arange(depth.size), labels, None, (depth, keyframe), within_m=0.5)
+    grown, uncovered = np.ones((40, 60), np.uint8), np.ones((40, 60), np.bool_)
+    grown[10:30, 20:32], uncovered[10:30, 20:22] = 7, False
+    np.testing.assert_array_equal(traced.labels.reshape(40, 60), grown)
+    np.testing.assert_array_equal(traced.covered.reshape(40, 60), uncovered)
+
+
+def test_without_pixels_nothing_is_traced() -> None:
+    rows, flat = np.empty(0, np.intp), np.full((64, 96), 3, np.float32)
+    traced = Chain.start(GREY).trace(rows, LABELS, flat, (flat, flat), within_m=0.5)
+    assert traced.confidence is not None
+    assert traced.labels.shape == traced.confidence.shape == traced.covered.shape == traced.rows.shape == (0,)
+    assert (traced.labels.dtype, traced.confidence.dtype, traced.covered.dtype) == (np.uint8, np.float32, np.bool_)
+    assert Chain.start(GREY).trace(rows, LABELS, None, (flat, flat), within_m=0.5).confidence is None
+
+
+def test_a_larger_keyframe_is_traced_to_the_middle_of_what_a_pixel_shows() -> None:
+    fine, flat = generator(1, "fine").integers(0, 13, (192, 288)).astype(np.uint8), np.full((64, 96), 3, np.float32)
+    there = np.full((192, 288), np.nan, np.float32)
+    there[1::3, 1::3] = 3
+    sure = fine.astype(np.float32) / 13
+    traced = Chain.start(GREY).extended(flow(4, -2)).trace(EVERYWHERE, fine, sure, (flat, there), within_m=0.5)
+    inner = np.s_[2:, :92]
+    labels, covered = traced.labels.reshape(64, 96), traced.covered.reshape(64, 96)
+    np.testing.assert_array_equal(labels[inner], fine[1::3, 1::3][:-2, 4:])
+    np.testing.assert_array_equal(covered, np.pad(np.ones((62, 92), np.bool_), ((2, 0), (0, 4))))
+    assert traced.confidence is not None
+    np.testing.assert_array_equal(traced.confidence.reshape(64, 96)[inner], sure[1::3, 1::3][:-2, 4:])
+
+
+def test_a_smaller_keyframe_and_working_image_are_traced_without_a_shift() -> None:
+    """Each pixel of theirs is 3 by 3 of the answer."""
+    keyframe = depths(5)
+    depth, fine = np.kron(keyframe, np.ones((3, 3), np.float32)), np.arange(192 * 288)
+    traced = Chain.start(GREY).extended(flow(4, -2)).trace(fine, LABELS, None, (depth, keyframe), within_m=10)
+    blocks, known = (np.kron(part, np.ones((3, 3), np.uint8)) for part in (LABELS, ~np.isnan(keyframe)))
+    labels, covered = traced.labels.reshape(192, 288), traced.covered.reshape(192, 288)
+    np.testing.assert_array_equal(labels[6:, :276], blocks[:-6, 12:])
+    np.testing.assert_array_equal(covered[6:, :276], (known[:-6, 12:] & known[6:, :276]) > 0)
+    assert not covered[:6].any()
+    assert not covered[:, 276:].any()
 
 
 def test_labels_of_another_size_than_the_working_image_do_not_shift() -> None:

@@ -10,11 +10,12 @@ from stsem.camera import Camera
 from stsem.chance import generator
 from stsem.classes import NO_LABEL
 from stsem.frame import Depth
-from stsem.geometry.reproject import View, among, correspond
+from stsem.geometry.reproject import View, among, correspond, looked_past
 from stsem.pose import Pose, from_quaternion
 
 CAMERA = Camera(96, 64, 60.0, 62.0, 47.2, 31.4)
 LABELS = generator(0, "labels").integers(0, 13, (64, 96)).astype(np.uint8)
+EVERYWHERE = np.arange(64 * 96)
 Rays = npt.NDArray[np.float64]
 
 
@@ -123,3 +124,89 @@ def test_a_camera_that_does_not_fit_is_refused() -> None:
         View(np.ones((10, 10), np.float32), np.eye(4), CAMERA)
     with pytest.raises(ValueError, match="undistorted camera"):
         View(np.ones((64, 96), np.float32), np.eye(4), Camera(96, 64, 60, 60, 47, 31, (0.1,), "plumb_bob"))
+
+
+def flat(distance: float, camera: Camera = CAMERA) -> Depth:
+    return np.full((camera.height, camera.width), distance, np.float32)
+
+
+def past(current: View, keyframe: View, rows: npt.NDArray[np.intp] = EVERYWHERE) -> npt.NDArray[np.bool_]:
+    found = looked_past(current, keyframe, rows, clearance_m=0.5)
+    assert found.shape == rows.shape
+    assert found.dtype == np.bool_
+    return found
+
+
+@pytest.mark.parametrize(("distance", "expected"), [(1, True), (2.4, True), (2.6, False), (3, False), (5, False)])
+def test_a_keyframe_looked_past_what_stands_in_front_of_what_it_saw(distance: float, expected: bool) -> None:
+    """It saw a wall at 3 m; what is there now must be nearer by half a metre."""
+    assert (past(View(flat(distance), np.eye(4), CAMERA), View(flat(3), np.eye(4), CAMERA)) == expected).all()
+
+
+def test_a_keyframe_looked_past_what_came_though_both_cameras_moved() -> None:
+    """A box at 1 m came before a wall at 3 m; 0.5 m to the side is 30 pixels on the box; 10 columns look elsewhere."""
+    here, came = flat(3), np.zeros((64, 96), np.bool_)
+    here[20:44, 10:26] = here[50:60, 60:80] = 1
+    came[20:44, 10:26] = came[50:60, 60:66] = True
+    current, keyframe = View(here, pose(1.5, 2, 3), CAMERA), View(flat(3), pose(1, 2, 3), CAMERA)
+    np.testing.assert_array_equal(past(current, keyframe).reshape(64, 96), came)
+    nearer = View(here - np.float32(0.25), pose(1.5, 2, 3.25), CAMERA)
+    assert not past(nearer, keyframe)[here.reshape(-1) == 3].any()
+    box = View(here, pose(1, 2, 3), CAMERA)
+    assert not past(View(flat(3), pose(1.5, 2, 3), CAMERA), box).any()
+
+
+def test_some_pixels_are_looked_past_as_all_are_in_any_order() -> None:
+    here, there = pose(0.1, 0, 0.2, 0, 0.05, 0, 1), pose(0, 0, 0)
+    near = plane(here)
+    near[generator(3, "near").random(near.shape) < 0.4] /= 2
+    current, keyframe = View(near, here, CAMERA), View(plane(there), there, CAMERA)
+    whole = past(current, keyframe)
+    assert 0.2 < whole.mean() < 0.4
+    order = generator(4, "order").permutation(64 * 96)
+    for count in (1, 2, 256, 257, 1000, 64 * 96):
+        np.testing.assert_array_equal(past(current, keyframe, order[:count]), whole[order[:count]])
+
+
+def test_a_keyframe_did_not_look_past_what_is_outside_of_it_or_behind_it() -> None:
+    current = View(flat(1), np.eye(4), CAMERA)
+    aside = past(current, View(flat(3), pose(0.5, 0, 0), CAMERA)).reshape(64, 96)
+    np.testing.assert_array_equal(aside, np.broadcast_to(np.arange(96) >= 30, (64, 96)))
+    for distance in (50.0, -50.0, 1e30):
+        assert not past(current, View(flat(3), pose(distance, 0, 0), CAMERA)).any()
+    assert not past(current, View(flat(3), pose(0, 0, 0, 0, 1, 0, 0), CAMERA)).any()
+    assert not past(current, View(flat(3), pose(0, 0, 2), CAMERA)).any()
+
+
+def test_a_keyframe_did_not_look_past_where_either_depth_is_unknown() -> None:
+    here, there = flat(1), flat(3)
+    here[10:20, 10:20] = there[15:25, 40:50] = np.nan
+    found = past(View(here, np.eye(4), CAMERA), View(there, np.eye(4), CAMERA))
+    np.testing.assert_array_equal(found, ~np.isnan(here + there).reshape(-1))
+
+
+def test_without_pixels_nothing_is_looked_past() -> None:
+    assert not len(past(View(flat(1), np.eye(4), CAMERA), View(flat(3), np.eye(4), CAMERA), np.empty(0, np.intp)))
+
+
+def test_a_keyframe_of_another_size_is_looked_at_where_it_shows_the_point() -> None:
+    half, there = CAMERA.scaled(48, 32), flat(3)
+    there[:, :40] = 1
+    small, large = View(flat(1, half), np.eye(4), half), View(there, np.eye(4), CAMERA)
+    rows = np.arange(48 * 32)
+    np.testing.assert_array_equal(past(small, large, rows), rows % 48 >= 20)
+    there = flat(3, half)
+    there[:, :20] = 1
+    found = past(View(flat(1), np.eye(4), CAMERA), View(there, np.eye(4), half))
+    np.testing.assert_array_equal(found, EVERYWHERE % 96 >= 40)
+
+
+def test_a_lit_view_is_the_same_one_with_its_shadows_filled() -> None:
+    depth = flat(3)
+    depth[:, :30], depth[:, 30:36] = 1, np.nan
+    dark = View(depth, pose(1, 2, 3), CAMERA)
+    lit = dark.lit()
+    np.testing.assert_array_equal(lit.depth, np.where(np.isnan(depth), np.float32(3), depth))
+    np.testing.assert_array_equal(lit.T_WC, dark.T_WC)
+    assert lit.camera == CAMERA
+    assert np.isnan(dark.depth[:, 30:36]).all()

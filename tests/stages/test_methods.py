@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import permutations
 
 import cv2
 import numpy as np
@@ -14,7 +15,7 @@ from stsem.classes import ClassSet, Labels
 from stsem.frame import Frame, Segmentation
 from stsem.stages.keyframe import Keyframe, view_of
 from stsem.stages.propagate import PROPAGATIONS
-from stsem.stages.propagation.depth import KEPT, NO_SPACE, DepthWarp
+from stsem.stages.propagation.depth import KEPT, LIT, NO_SPACE, DepthWarp
 from stsem.stages.propagation.flow import LOST, Flow
 from stsem.stages.propagation.homography import ChainedHomography
 from stsem.stages.propagation.method import Predicted, Propagation
@@ -217,16 +218,17 @@ def test_depth_falls_back_to_flow_and_says_so(lacks: str) -> None:
 
 
 def test_what_nobody_saw_is_guessed_and_not_covered() -> None:
-    """A wall of one class goes on as that class where the image of the keyframe ended, with the votes as confidence."""
+    """A wall, and a darker floor, go on where the image of the keyframe ended, with the votes as confidence."""
     wall_on_floor = np.where(np.arange(HEIGHT)[:, None] < 90, 0, 2).astype(np.uint8).repeat(WIDTH, axis=1)
-    played = Played(made("depth"))
-    first, last = WALK[0][0], WALK[-1][0]
+    played, shade = Played(made("depth")), np.where(wall_on_floor == 0, 4, 1).astype(np.uint8)[..., None]
+    walk = [replace(frame, image=frame.image // 4 * shade) for frame, _ in WALK]
+    first, last = walk[0], walk[-1]
     played.see(first)
     played.select(first)
     sure = Segmentation(wall_on_floor, np.full(wall_on_floor.shape, 0.5, np.float32))
     source = Keyframe(0, 0, sure, None, view_of(first), first.image)
     played.method.finished(source)
-    for frame, _ in WALK[1:]:
+    for frame in walk[1:]:
         played.see(frame)
     answer = played.predict(source, last).answer
     assert answer.covered is not None
@@ -238,12 +240,44 @@ def test_what_nobody_saw_is_guessed_and_not_covered() -> None:
     assert (answer.confidence[:, new] > 0.5).mean() > 0.9
 
 
+def remember(method: DepthWarp, stamp: int, seen: tuple[Frame, Labels]) -> None:
+    frame, labels = seen
+    method.finished(Keyframe(stamp, stamp, Segmentation(labels), None, view_of(frame), frame.image))
+
+
 def test_depth_remembers_so_many_keyframes() -> None:
-    """The newest by stamp, in whatever order they finished."""
-    method, (frame, labels) = DepthWarp(CLASSES), WALK[0]
+    """The newest by stamp, in whatever order they finished; the newest of them know what lies in shadows."""
+    method = DepthWarp(CLASSES)
     for stamp in (*range(0, 2 * KEPT, 2), *range(1, 2 * KEPT, 2)):
-        method.finished(Keyframe(stamp, stamp, Segmentation(labels), None, view_of(frame), frame.image))
-    assert [memory.stamp_ns for memory in method._memory] == list(range(2 * KEPT - 1, KEPT - 1, -1))
+        remember(method, stamp, WALK[0])
+        stamps = [memory.stamp_ns for memory in method._memory]
+        assert stamps == sorted(stamps, reverse=True)
+        assert [memory.lit is not None for memory in method._memory] == [i < LIT for i in range(len(stamps))]
+    assert stamps == list(range(2 * KEPT - 1, KEPT - 1, -1))
+    remember(method, 1, WALK[0])
+    assert [memory.stamp_ns for memory in method._memory] == stamps
+
+
+@pytest.mark.parametrize("order", list(permutations(range(4)))[1:])
+def test_the_memory_does_not_depend_on_the_order_in_which_keyframes_finish(order: tuple[int, ...]) -> None:
+    """Older ones keep what newer ones do not show: each has depth in two quarters of its image."""
+    shots = []
+    for i, (frame, labels) in enumerate((WALK[0], WALK[3], WALK[6], WALK[9])):
+        known = np.isin(np.arange(WIDTH) // (WIDTH // 4), (i, (i + 1) % 4))
+        depth = np.where(known, np.float32(FAR), np.float32(np.nan))[None].repeat(HEIGHT, axis=0)
+        shots.append((replace(frame, depth=depth), labels))
+    right, method = DepthWarp(CLASSES), DepthWarp(CLASSES)
+    for stamp in range(4):
+        remember(right, stamp, shots[stamp])
+    for stamp in order:
+        remember(method, stamp, shots[stamp])
+    sizes = [len(memory.examples.labels) for memory in right._memory]
+    assert sizes[0] > sizes[-1] > 0
+    for found, wanted in zip(method._memory, right._memory, strict=True):
+        assert found.stamp_ns == wanted.stamp_ns
+        np.testing.assert_array_equal(found.examples.features, wanted.examples.features)
+        np.testing.assert_array_equal(found.examples.labels, wanted.examples.labels)
+    assert len(method._likeness) == sum(sizes)
 
 
 def test_flow_over_a_change_of_size_holds() -> None:

@@ -1,24 +1,28 @@
 """Depth: the exact warp by depth and pose from the keyframes that saw each point; the rest by likeness and flow."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stsem.classes import ClassSet
 from stsem.frame import Frame, Segmentation
-from stsem.geometry.carried import Carried
-from stsem.geometry.carry import Source, carry, moving_classes
-from stsem.geometry.likeness import Examples, completed, described, remembered
-from stsem.geometry.reproject import Rows, View, among
+from stsem.geometry.carried import Draft
+from stsem.geometry.carry import Source, carry, carry_more, follow, moving_classes, settle
+from stsem.geometry.cells import described
+from stsem.geometry.flow import Traced
+from stsem.geometry.likeness import Examples, Movers, guess, remembered
+from stsem.geometry.packed import Rows
+from stsem.geometry.reproject import View, among
 from stsem.stages.keyframe import Keyframe, view_of
 from stsem.stages.propagation.flow import Flow
+from stsem.stages.propagation.hold import uncovered
 from stsem.stages.propagation.method import Needs, Predicted
 from stsem.stages.register import Registration
 
 KEPT = 32
 """Keyframes remembered: up to 9 bytes a pixel each, 152 MB in all at 960x540 with what they look like."""
-LIKENED = 16
-"""Of them, those whose points serve as examples: 32 are no better on the whole, and their search tree takes 30 ms."""
+LIT = 8
+"""Of them, those that are asked what lies in shadows, by depth that is a guess."""
 SAMPLES = 2048
 """Pixels by which the coverage of a frame is foretold."""
 FLOW_SIDE = 320
@@ -34,6 +38,7 @@ class _Memory:
 
     stamp_ns: int
     source: Source
+    lit: Source | None
     examples: Examples
 
 
@@ -72,35 +77,45 @@ class DepthWarp:
         if view is None or image is None:
             return
         source = Source(view, answer.labels, answer.confidence).without(self._moving)
-        new = _Memory(keyframe.stamp_ns, source, Examples.of(described(view, image), answer.labels))
-        self._memory = tuple(sorted([new, *self._memory], key=lambda memory: -memory.stamp_ns)[:KEPT])
-        self._likeness = remembered([memory.examples for memory in self._memory[:LIKENED]])
+        lit = source.lit()
+        new = _Memory(keyframe.stamp_ns, source, lit, Examples.of(described(lit.view, image), answer.labels))
+        self._memory = _with(new, self._memory)
+        self._likeness = remembered([memory.examples for memory in self._memory])
 
     def forgotten(self, index: int) -> None:
         """Its chain is let go; its depth and labels stay."""
         self._flow.forgotten(index)
 
     def predict(self, source: Keyframe, frame: Frame, registration: Registration | None) -> Predicted:
-        """By depth where a keyframe saw the point; persons by flow; the rest by likeness."""
-        by_flow, view = self._flow.predict(source, frame, registration), view_of(frame)
+        """By depth where a keyframe saw the point; persons by flow; the rest by depth in shadows, likeness, flow."""
+        view = view_of(frame)
         if view is None or not (view.depth > 0).any():
-            return Predicted(by_flow.answer, source.index, NO_SPACE)
-        rest = self._followed(by_flow.answer, source, view)
-        seen = carry(view, [memory.source for memory in self._memory], rest, moving=self._moving)
-        found = self._completed(seen, view, frame)
-        return Predicted(Segmentation(found.labels, found.confidence, covered=found.covered), source.index)
+            return Predicted(self._flow.predict(source, frame, registration).answer, source.index, NO_SPACE)
+        answer, lit = source.segmentation, view.lit()
+        draft = Draft.blank(view.depth.shape, sure=answer.confidence is not None)
+        carry(draft, view, [memory.source for memory in self._memory])
+        traced = self._traced(np.flatnonzero(draft.open), source, view)
+        follow(draft, traced, moving=self._moving)
+        carry_more(draft, lit, [memory.lit for memory in self._memory if memory.lit is not None])
+        self._guessed(draft, lit, frame)
+        settle(draft, traced)
+        return Predicted(Segmentation(draft.labels, draft.confidence, covered=draft.covered), source.index)
 
-    def _followed(self, answer: Segmentation, source: Keyframe, view: View) -> Carried:
-        """What flow says; covered where the frame is still about as far away as the keyframe was."""
-        chain = self._flow.chain(source.index)
-        if answer.covered is None or chain is None or source.view is None:
-            return Carried(answer.labels, answer.confidence, np.zeros(answer.labels.shape, np.bool_))
-        stays = chain.stays(view.depth, source.view.depth, within_m=STRIDE_M)
-        return Carried(answer.labels, answer.confidence, answer.covered & stays)
+    def _traced(self, rows: Rows, source: Keyframe, view: View) -> Traced:
+        """What flow says of the pixels `rows`; without a chain, what the keyframe has there, and nothing covered."""
+        chain, answer = self._flow.chain(source.index), source.segmentation
+        if chain is not None and source.view is not None:
+            depths = view.depth, source.view.depth
+            return chain.trace(rows, answer.labels, answer.confidence, depths, within_m=STRIDE_M)
+        size = view.camera.width, view.camera.height
+        kept = uncovered(answer, size) if chain is None else chain.carry(answer.labels, answer.confidence, size)
+        sure = None if kept.confidence is None else kept.confidence.reshape(-1)[rows]
+        return Traced(rows, kept.labels.reshape(-1)[rows], sure, np.zeros(len(rows), np.bool_))
 
-    def _completed(self, seen: Carried, view: View, frame: Frame) -> Carried:
-        """`seen` with guesses by likeness for what is not covered."""
-        return completed(seen, described(view, frame.image), self._likeness)
+    def _guessed(self, draft: Draft, view: View, frame: Frame) -> None:
+        """Guesses by likeness for what is open."""
+        newest = self._memory[0].source.view if self._memory else None
+        guess(draft, described(view, frame.image), self._likeness, Movers(self._moving, newest))
 
     def expected_coverage(self, frame: Frame, registration: Registration) -> float | None:
         """The share of some pixels with depth that any keyframe saw, persons or not; by flow for a frame without depth.
@@ -125,6 +140,16 @@ class DepthWarp:
             pairs = among(view, keyframe, left)
             left = left[~pairs.found.reshape(-1)[: len(left)]]
         return len(rows) - len(left)
+
+
+def _with(new: _Memory, memory: tuple[_Memory, ...]) -> tuple[_Memory, ...]:
+    """`memory` with `new`, the newest first: what older ones show of the same places is let go, of the oldest all."""
+    newer = [one for one in memory if one.stamp_ns >= new.stamp_ns]
+    for one in newer:
+        new = replace(new, examples=new.examples.without(one.examples))
+    older = [replace(one, examples=one.examples.without(new.examples)) for one in memory[len(newer) :]]
+    kept = [*newer, new, *older][:KEPT]
+    return (*kept[:LIT], *(replace(one, lit=None) for one in kept[LIT:]))
 
 
 def _spread(size: int) -> Rows:
