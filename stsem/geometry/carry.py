@@ -13,7 +13,7 @@ from stsem.classes import NO_LABEL, ClassSet, Labels, normalised
 from stsem.geometry.carried import Bools, Draft
 from stsem.geometry.flow import Traced
 from stsem.geometry.packed import Rows
-from stsem.geometry.reproject import DEFAULT_AGREEMENT, Agreement, Correspondence, View, among, correspond
+from stsem.geometry.reproject import DEFAULT_AGREEMENT, Agreement, Correspondence, View, among, correspond, in_image
 from stsem.uncertainty import Confidence
 
 MOVING = frozenset(map(normalised, (
@@ -96,9 +96,12 @@ def carry_more(
         return
     asked, flat = 0, draft.labels.reshape(-1)
     rows = np.flatnonzero(draft.open & (current.depth > 0))
-    for source in sources:
+    inside = in_image(current, [source.view for source in sources], rows[:: max(1, len(rows) // SAMPLES)])
+    for source, possible in zip(sources, inside, strict=True):
         if asked == at_most:
             return
+        if not possible:
+            continue
         sample = rows[:: max(1, len(rows) // SAMPLES)]
         hits = np.count_nonzero(among(current, source.view, sample, agreement=agreement).found)
         if hits * len(rows) > MIN_GAIN * flat.size * len(sample):

@@ -16,7 +16,7 @@ Votes = npt.NDArray[np.float32]
 """(..., classes) float32: shares of a vote, which sum to 1, or all 0 where nothing is known."""
 Planes = npt.NDArray[np.float32]
 
-STEPS = (16, 8, 4, 2, 1)
+STEPS = (16, 4, 1)
 """Cells between neighbours."""
 WEIGHT = 10.0
 """Of a neighbour that looks the same, against the cell's own votes."""

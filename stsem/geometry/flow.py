@@ -130,6 +130,19 @@ class Chain:
         inside = cv2.resize(self.inside.view(np.uint8), size, interpolation=cv2.INTER_NEAREST_EXACT)
         return Carried(_fetched(labels, places), sure, np.asarray(inside, np.uint8).view(np.bool_))
 
+    def leads_to(self, classes: Bools, labels: Labels, size: tuple[int, int]) -> Bools:
+        """(H, W) bool of `size` (W, H): where the chain leads to one of `classes`, or beside a pixel that does.
+
+        Args:
+            classes: (256,) bool by id.
+            labels: (H, W) of the keyframe.
+        """
+        height, width = self.inside.shape
+        scale = np.array([labels.shape[1] / width, labels.shape[0] / height], np.float32)
+        there = classes.view(np.uint8)[_fetched(labels, _scaled(self.places, scale))]
+        near = cv2.resize(cv2.dilate(there, np.ones((3, 3), np.uint8)), size, interpolation=cv2.INTER_NEAREST_EXACT)
+        return np.asarray(near, np.uint8).view(np.bool_)
+
     def trace(
         self, rows: Rows, labels: Labels, confidence: Confidence | None, depths: tuple[Depth, Depth], *, within_m: float
     ) -> Traced:

@@ -46,13 +46,13 @@ def test_it_is_what_a_loop_over_cells_gives() -> None:
 
 
 def test_evidence_reaches_as_far_as_the_steps_sum_up_to() -> None:
-    """From the two cells at one end of a row to all that are so far away, and to none farther."""
-    place, normal, colour = wall(1, 40)
-    votes, asked = np.full((1, 40, 2), 0.5, np.float32), np.ones((1, 40), np.bool_)
-    votes[0, :2], asked[0, :2] = (1, 0), False
+    """From as many cells as the widest step, at one end of a row, to all that are so far away, and to none farther."""
+    place, normal, colour = wall(1, 60)
+    votes, asked = np.full((1, 60, 2), 0.5, np.float32), np.ones((1, 60), np.bool_)
+    votes[0, :16], asked[0, :16] = (1, 0), False
     reached = diffused(votes, asked, place, normal, colour)[:, 0] > 0.5 + 1e-5
-    np.testing.assert_array_equal(reached, np.arange(2, 40) <= 1 + sum(STEPS))
-    assert sum(STEPS) == 31
+    np.testing.assert_array_equal(reached, np.arange(16, 60) <= 15 + sum(STEPS))
+    assert sum(STEPS) == 21
 
 
 def test_what_is_given_is_left_alone() -> None:
@@ -66,15 +66,15 @@ def test_what_is_given_is_left_alone() -> None:
 
 def test_evidence_goes_along_a_surface_and_stops_at_its_edge() -> None:
     """Left a wall of class 0, right a board of class 1; what lies between, undecided, is decided by colour."""
-    place, normal, colour = wall(16, 30)
-    colour[:, 15:] = 160
-    votes, asked = np.full((16, 30, 2), 0.5, np.float32), np.zeros((16, 30), np.bool_)
-    asked[:, 8:22] = True
-    votes[:, :8], votes[:, 22:] = (1, 0), (0, 1)
-    found = np.zeros((16, 30), np.intp)
+    place, normal, colour = wall(16, 62)
+    colour[:, 31:] = 160
+    votes, asked = np.full((16, 62, 2), 0.5, np.float32), np.zeros((16, 62), np.bool_)
+    asked[:, 24:38] = True
+    votes[:, :24], votes[:, 38:] = (1, 0), (0, 1)
+    found = np.zeros((16, 62), np.intp)
     found[asked] = diffused(votes, asked, place, normal, colour).argmax(axis=1)
-    assert (found[:, 8:15] == 0).all()
-    assert (found[:, 15:22] == 1).all()
+    assert (found[:, 24:31] == 0).all()
+    assert (found[:, 31:38] == 1).all()
 
 
 def test_a_neighbour_without_place_has_no_say() -> None:

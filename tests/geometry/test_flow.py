@@ -148,6 +148,20 @@ def test_a_chain_stays_with_a_body_and_not_with_what_it_uncovers() -> None:
     np.testing.assert_array_equal(traced.covered.reshape(40, 60), uncovered)
 
 
+def test_it_is_told_where_a_chain_leads_to_some_classes() -> None:
+    """A person of 10 by 20 pixels, five pixels to the right since; a pixel around belongs to it."""
+    labels = np.zeros((64, 96), np.uint8)
+    labels[20:40, 30:40] = 7
+    expected = np.zeros((64, 96), np.bool_)
+    expected[19:41, 34:46] = True
+    chain = Chain.start(GREY).extended(flow(-5, 0))
+    np.testing.assert_array_equal(chain.leads_to(np.arange(256) == 7, labels, (96, 64)), expected)
+    twice = np.repeat(np.repeat(labels, 2, axis=0), 2, axis=1)
+    full = chain.leads_to(np.arange(256) == 7, twice, (192, 128))
+    np.testing.assert_array_equal(full, np.repeat(np.repeat(expected, 2, axis=0), 2, axis=1))
+    assert not chain.leads_to(np.arange(256) == 8, labels, (96, 64)).any()
+
+
 def test_without_pixels_nothing_is_traced() -> None:
     rows, flat = np.empty(0, np.intp), np.full((64, 96), 3, np.float32)
     traced = Chain.start(GREY).trace(rows, LABELS, flat, (flat, flat), within_m=0.5)

@@ -10,7 +10,7 @@ from stsem.camera import Camera
 from stsem.chance import generator
 from stsem.classes import NO_LABEL
 from stsem.frame import Depth
-from stsem.geometry.reproject import View, among, correspond, looked_past
+from stsem.geometry.reproject import View, among, correspond, in_image, looked_past
 from stsem.pose import Pose, from_quaternion
 
 CAMERA = Camera(96, 64, 60.0, 62.0, 47.2, 31.4)
@@ -210,3 +210,34 @@ def test_a_lit_view_is_the_same_one_with_its_shadows_filled() -> None:
     np.testing.assert_array_equal(lit.T_WC, dark.T_WC)
     assert lit.camera == CAMERA
     assert np.isnan(dark.depth[:, 30:36]).all()
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**16))
+def test_where_no_pixel_falls_into_the_image_nothing_is_found(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    poses = [pose(*rng.uniform(-2, 2, 3), *rng.normal(size=4)) for _ in range(6)]
+    views = [View(np.full((64, 96), 3, np.float32), one, CAMERA) for one in poses]
+    rows = np.sort(rng.choice(EVERYWHERE, 40, replace=False))
+    possible = in_image(views[0], views, rows)
+    assert possible[0]
+    for view, inside in zip(views, possible, strict=True):
+        assert inside or not among(views[0], view, rows).found.any()
+
+
+@pytest.mark.parametrize(
+    ("x", "turn", "expected"), [(0.0, 0.0, True), (4.7, 0.0, True), (4.9, 0.0, False), (0.0, 1.0, False)]
+)
+def test_a_keyframe_beside_or_behind_has_nothing_in_its_image(x: float, turn: float, expected: bool) -> None:
+    """At 3 m, 96 pixels are 4.8 m wide; a half turn about the vertical looks away."""
+    depth = np.full((64, 96), 3, np.float32)
+    keyframe = View(depth, pose(x, 0, 0, 0, turn, 0, 1 - turn), CAMERA)
+    assert in_image(View(depth, np.eye(4), CAMERA), [keyframe], EVERYWHERE).tolist() == [expected]
+
+
+def test_without_pixels_or_depth_or_keyframes_nothing_is_in_an_image() -> None:
+    view = View(np.full((64, 96), 3, np.float32), np.eye(4), CAMERA)
+    blind = View(np.full((64, 96), np.nan, np.float32), np.eye(4), CAMERA)
+    assert in_image(view, [view], EVERYWHERE[:0]).tolist() == [False]
+    assert in_image(blind, [view], EVERYWHERE).tolist() == [False]
+    assert in_image(view, [], EVERYWHERE).tolist() == []

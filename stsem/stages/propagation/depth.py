@@ -94,12 +94,18 @@ class DepthWarp:
         answer, lit = source.segmentation, view.lit()
         draft = Draft.blank(view.depth.shape, sure=answer.confidence is not None)
         carry(draft, view, [memory.source for memory in self._memory])
-        traced = self._traced(np.flatnonzero(draft.open), source, view)
-        follow(draft, traced, moving=self._moving)
+        follow(draft, self._traced(self._perhaps_moving(draft, source), source, view), moving=self._moving)
         carry_more(draft, lit, [memory.lit for memory in self._memory if memory.lit is not None])
         self._guessed(draft, lit, frame)
-        settle(draft, traced)
+        settle(draft, self._traced(np.flatnonzero(draft.open), source, view))
         return Predicted(Segmentation(draft.labels, draft.confidence, covered=draft.covered), source.index)
+
+    def _perhaps_moving(self, draft: Draft, source: Keyframe) -> Rows:
+        """(n,) the open pixels that flow may lead to a class that moves."""
+        chain, (height, width) = self._flow.chain(source.index), draft.labels.shape
+        if chain is None or not self._moving.any():
+            return np.empty(0, np.intp)
+        return np.flatnonzero(chain.leads_to(self._moving, source.segmentation.labels, (width, height)) & draft.open)
 
     def _traced(self, rows: Rows, source: Keyframe, view: View) -> Traced:
         """What flow says of the pixels `rows`; without a chain, what the keyframe has there, and nothing covered."""
