@@ -60,7 +60,7 @@ class Bare(Memoryless):
 
 
 class Carry(DepthWarp):
-    """`depth` without its guesses: what no keyframe saw comes by flow."""
+    """`depth` without likeness: what no keyframe saw comes by flow."""
 
     def _guessed(self, draft: Draft, view: View, frame: Frame) -> None:
         pass

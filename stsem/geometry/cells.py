@@ -89,10 +89,11 @@ def described(view: View, image: Image) -> Cells:
     middle = np.s_[side // 2 :: side, side // 2 :: side]
     x, y = np.arange(columns) * side + side // 2, np.arange(rows) * side + side // 2
     depth = view.depth[middle][:rows, :columns]
-    place = _placed(view, x.astype(np.float32)[None, :], y.astype(np.float32)[:, None], depth)
+    seen = _seen(view, x.astype(np.float32)[None, :], y.astype(np.float32)[:, None], depth)
     whole = image[: rows * side, : columns * side]
     colour = lightened(_mean(whole, columns, rows))
-    return Cells(place, _normals(place), colour, _texture(whole, columns, rows), view, image, side)
+    place = np.asarray(seen + view.T_WC[:3, 3], np.float32)
+    return Cells(place, _normals(seen), colour, _texture(whole, columns, rows), view, image, side)
 
 
 def lightened(colours: Image) -> Float32:
@@ -113,18 +114,16 @@ def _texture(image: Image, columns: int, rows: int) -> Float32:
     return np.asarray(np.sqrt(np.maximum(square - mean * mean, 0)), np.float32)
 
 
-def _placed(view: View, x: Float32, y: Float32, depth: Float32) -> Float32:
-    """(h, w, 3) metres in the world: X = R z K^-1 (u, v, 1) + t; not finite where depth is unknown."""
-    ray = (view.T_WC[:3, :3] @ np.linalg.inv(view.camera.K)).astype(np.float32)
+def _seen(view: View, x: Float32, y: Float32, depth: Float32) -> Float32:
+    """(h, w, 3) metres from the camera along the axes of the world: R z K^-1 (u, v, 1); NaN where depth is unknown."""
+    ray = (view.T_WC[:3, :3] @ view.rays).astype(np.float32)
     known = np.where(depth > 0, depth, np.float32(np.nan))
     # Written out instead of a matrix product: BLAS may round differently with other thread counts.
-    return np.stack(
-        [(a * x + b * y + c) * known + np.float32(t) for (a, b, c), t in zip(ray, view.T_WC[:3, 3], strict=True)], -1
-    )
+    return np.stack([(a * x + b * y + c) * known for a, b, c in ray], axis=-1)
 
 
 def _normals(place: Float32) -> Float32:
-    """(h, w, 3) unit normals, towards the camera; zero where a neighbour is unknown."""
+    """(h, w, 3) of unit length, of the surface through `place` (h, w, 3), towards the camera; 0 by an unknown place."""
     if min(place.shape[:2]) < 2:
         return np.zeros_like(place)
     down, right = np.gradient(place, axis=0), np.gradient(place, axis=1)

@@ -133,6 +133,8 @@ class Chain:
     def leads_to(self, classes: Bools, labels: Labels, size: tuple[int, int]) -> Bools:
         """(H, W) bool of `size` (W, H): where the chain leads to one of `classes`, or beside a pixel that does.
 
+        By the pixels of the working image: what is thinner than one of them may be missed.
+
         Args:
             classes: (256,) bool by id.
             labels: (H, W) of the keyframe.
@@ -146,7 +148,7 @@ class Chain:
     def trace(
         self, rows: Rows, labels: Labels, confidence: Confidence | None, depths: tuple[Depth, Depth], *, within_m: float
     ) -> Traced:
-        """What `carry` says of some pixels, covered only where the chain ends at about the distance it began at.
+        """What `carry` says of some pixels, but for rounding; covered where the chain ends about as far as it began.
 
         Flow that stuck to the edge of what moves ends on it, while the frame shows what it uncovered, farther away.
         Where either depth is unknown, it is not covered.

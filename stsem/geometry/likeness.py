@@ -28,6 +28,8 @@ Cubes = npt.NDArray[np.int64]
 
 SPACING_M = 0.2
 """Of the examples in one cube of this side, only those of the newest keyframe that has some there are kept."""
+MOST = 40_000
+"""Examples of keyframes before the newest one: the time for the search tree grows with them."""
 PLACE_M, HEIGHT_M, NORMAL = 4.0, 0.15, 1.2
 """What counts as a distance of 1: metres, length of the difference of unit normals."""
 LIGHTNESS, COLOUR = 12.5, 3.2
@@ -66,6 +68,10 @@ class Examples:
         at = np.asarray(cells.middles(labels), np.uint8)
         usable = cells.known & (at != NO_LABEL)
         return cls(features_of(cells, usable), at[usable], _cubes(cells.place[usable]), cells.up)
+
+    def every(self, nth: int) -> "Examples":
+        """Every `nth` of them."""
+        return Examples(self.features[::nth], self.labels[::nth], self.cubes[::nth], self.up)
 
     def without(self, newer: "Examples") -> "Examples":
         """Those in cubes where `newer` has none."""
@@ -201,8 +207,10 @@ def _votes(labels: Labels, cells: Cells, likeness: Likeness, movers: Movers, ask
 
 
 def remembered(examples: Sequence[Examples]) -> Likeness:
-    """All `examples` of keyframes as one memory."""
-    return Likeness(tuple(examples))
+    """`examples` of keyframes, the newest first, as one memory; of the older ones every nth, as many as MOST allows."""
+    older = sum(len(some.labels) for some in examples[1:])
+    every = max(1, -(-older // MOST))
+    return Likeness((*examples[:1], *(some.every(every) for some in examples[1:])))
 
 
 def _cubes(places: Features) -> Cubes:

@@ -16,11 +16,11 @@ import numpy.typing as npt
 
 from stsem.camera import Camera
 from stsem.frame import Depth
+from stsem.geometry.carried import Bools
 from stsem.geometry.packed import Rows, packed
 from stsem.geometry.shadow import filled
 from stsem.pose import Pose, inverse
 
-Bools = npt.NDArray[np.bool_]
 Float32 = npt.NDArray[np.float32]
 Places = npt.NDArray[np.int16]
 """(h, w, 2) int16 column and row of the keyframe."""

@@ -20,7 +20,7 @@ from stsem.stages.propagation.method import Needs, Predicted
 from stsem.stages.register import Registration
 
 KEPT = 32
-"""Keyframes remembered: up to 9 bytes a pixel each, 152 MB in all at 960x540 with what they look like."""
+"""Keyframes remembered: up to 9 bytes a pixel each, 180 MB in all at 960x540 with what they look like."""
 LIT = 8
 """Of them, those that are asked what lies in shadows, by depth that is a guess."""
 SAMPLES = 2048
@@ -110,6 +110,8 @@ class DepthWarp:
     def _traced(self, rows: Rows, source: Keyframe, view: View) -> Traced:
         """What flow says of the pixels `rows`; without a chain, what the keyframe has there, and nothing covered."""
         chain, answer = self._flow.chain(source.index), source.segmentation
+        if not len(rows):
+            return Traced(rows, np.empty(0, np.uint8), None, np.empty(0, np.bool_))
         if chain is not None and source.view is not None:
             depths = view.depth, source.view.depth
             return chain.trace(rows, answer.labels, answer.confidence, depths, within_m=STRIDE_M)
