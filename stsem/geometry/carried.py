@@ -1,11 +1,12 @@
 """Labels brought from keyframes to the current frame, with what is known of them: the result of a warp."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from stsem.classes import NO_LABEL, Labels
+from stsem.geometry.packed import Rows
 from stsem.uncertainty import Confidence
 
 Bools = npt.NDArray[np.bool_]
@@ -44,6 +45,7 @@ class Draft:
     labels: Labels
     confidence: Confidence | None
     covered: Bools
+    _left: Rows | None = field(default=None, repr=False)
 
     @classmethod
     def blank(cls, shape: tuple[int, ...], *, sure: bool) -> "Draft":
@@ -55,3 +57,10 @@ class Draft:
     def open(self) -> Bools:
         """(H, W) bool: nobody has said anything yet."""
         return np.asarray(self.labels == NO_LABEL)
+
+    def left(self) -> Rows:
+        """(n,) the open pixels, counted row by row. They only ever become fewer, so it looks at the last ones again."""
+        flat = self.labels.reshape(-1)
+        last = self._left
+        self._left = np.flatnonzero(flat == NO_LABEL) if last is None else last[flat.take(last) == NO_LABEL]
+        return self._left

@@ -95,7 +95,8 @@ def carry_more(
     if not sources:
         return
     asked, flat = 0, draft.labels.reshape(-1)
-    rows = np.flatnonzero(draft.open & (current.depth > 0))
+    left = draft.left()
+    rows = left[current.depth.reshape(-1).take(left) > 0]
     inside = in_image(current, [source.view for source in sources], rows[:: max(1, len(rows) // SAMPLES)])
     for source, possible in zip(sources, inside, strict=True):
         if asked == at_most:

@@ -48,7 +48,8 @@ def spread(guess: Guess, draft: Draft) -> None:
         guess: for the cells of the frame.
         draft: of the size of the frame.
     """
-    at = np.flatnonzero(draft.open & (guess.cells.view.depth > 0))
+    left = draft.left()
+    at = left[guess.cells.view.depth.reshape(-1).take(left) > 0]
     quads = _quads(guess.labels.shape)
     quad = _quad_of_pixels(guess.labels.shape, guess.cells.side, draft.labels.shape)[at]
     corners, alike = guess.labels.reshape(-1)[quads], np.zeros(len(at), np.intp)

@@ -97,7 +97,7 @@ class DepthWarp:
         follow(draft, self._traced(self._perhaps_moving(draft, source), source, view), moving=self._moving)
         carry_more(draft, lit, [memory.lit for memory in self._memory if memory.lit is not None])
         self._guessed(draft, lit, frame)
-        settle(draft, self._traced(np.flatnonzero(draft.open), source, view))
+        settle(draft, self._traced(draft.left(), source, view))
         return Predicted(Segmentation(draft.labels, draft.confidence, covered=draft.covered), source.index)
 
     def _perhaps_moving(self, draft: Draft, source: Keyframe) -> Rows:
@@ -105,7 +105,8 @@ class DepthWarp:
         chain, (height, width) = self._flow.chain(source.index), draft.labels.shape
         if chain is None or not self._moving.any():
             return np.empty(0, np.intp)
-        return np.flatnonzero(chain.leads_to(self._moving, source.segmentation.labels, (width, height)) & draft.open)
+        near, left = chain.leads_to(self._moving, source.segmentation.labels, (width, height)), draft.left()
+        return left[near.reshape(-1).take(left)]
 
     def _traced(self, rows: Rows, source: Keyframe, view: View) -> Traced:
         """What flow says of the pixels `rows`; without a chain, what the keyframe has there, and nothing covered."""
